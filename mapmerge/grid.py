@@ -1,0 +1,116 @@
+"""Occupancy grid maps as values."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapmerge.errors import GridError
+from mapmerge.sim2 import IDENTITY, Points, Sim2
+
+Cells = NDArray[np.int8]
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
+
+UNKNOWN = -1
+MAX_SIDE_CELLS = 100_000
+
+
+def cell_centres_m(rows: Indices, cols: Indices, resolution_m: float) -> Points:
+    """Return the centres of cells in the frame of their grid, shape (N, 2), as x and y."""
+    centres: Points = np.empty((len(rows), 2), np.float64)
+    centres[:, 0] = (cols + 0.5) * resolution_m
+    centres[:, 1] = (rows + 0.5) * resolution_m
+    return centres
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grid:
+    """One occupancy grid map.
+
+    Parameters
+    ----------
+    cells
+        Shape (rows, columns), int8: probability of being occupied in percent, 0 to 100, or −1 for unknown.
+        Row 0 has the lowest y, as in ``nav_msgs/OccupancyGrid``. Made read-only.
+    resolution_m
+        Side of a cell.
+    map_from_grid
+        Pose in the map frame of the outer corner of cell (0, 0), rigid: ``info.origin`` of the message.
+
+    Raises
+    ------
+    GridError
+        If the shape, the resolution or the origin is not that of a map.
+    """
+
+    cells: Cells
+    resolution_m: float
+    map_from_grid: Sim2 = field(default=IDENTITY)
+
+    def __post_init__(self) -> None:
+        if self.cells.ndim != 2 or self.cells.dtype != np.int8:
+            raise GridError(f"cells are {self.cells.dtype} of shape {self.cells.shape}; expected int8 [rows, columns]")
+        if not (math.isfinite(self.resolution_m) and self.resolution_m > 0.0):
+            raise GridError(f"resolution is {self.resolution_m} m; expected a positive number")
+        if max(self.cells.shape) > MAX_SIDE_CELLS:
+            rows, cols = self.cells.shape
+            raise GridError(f"the grid has {cols} × {rows} cells; a side of at most {MAX_SIDE_CELLS} is expected")
+        pose = self.map_from_grid
+        if not all(map(math.isfinite, (pose.x_m, pose.y_m, pose.yaw_rad))):
+            raise GridError(f"the origin is ({pose.x_m}, {pose.y_m}, {pose.yaw_rad}); finite numbers are expected")
+        if pose.scale != 1.0:
+            raise GridError(f"the origin has scale {pose.scale}; a rigid pose is expected")
+        if self.cells.flags.writeable:
+            view = self.cells.view()
+            view.flags.writeable = False
+            object.__setattr__(self, "cells", view)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows, along y of the grid frame."""
+        return int(self.cells.shape[0])
+
+    @property
+    def cols(self) -> int:
+        """Number of columns, along x of the grid frame."""
+        return int(self.cells.shape[1])
+
+    @property
+    def known(self) -> Mask:
+        """Cells that are known, shape (rows, columns)."""
+        return self.cells >= 0
+
+    @property
+    def known_area_m2(self) -> float:
+        """Area of the known cells."""
+        return int(np.count_nonzero(self.cells >= 0)) * self.resolution_m**2
+
+    def same_as(self, other: Grid) -> bool:
+        """Tell whether both grids say the same of the same place."""
+        return (
+            self.resolution_m == other.resolution_m
+            and self.map_from_grid == other.map_from_grid
+            and self.cells.shape == other.cells.shape
+            and bool(np.array_equal(self.cells, other.cells))
+        )
+
+    def centres_m(self, mask: Mask) -> Points:
+        """Return the centres of the chosen cells in the map frame, shape (N, 2), row by row."""
+        rows, cols = np.nonzero(mask)
+        return self.map_from_grid.apply(cell_centres_m(rows, cols, self.resolution_m))
+
+    def cropped_to_known(self) -> Grid:
+        """Return the smallest part of this grid that holds all its known cells; 0 × 0 if there is none."""
+        known = self.known
+        rows = np.flatnonzero(known.any(axis=1))
+        cols = np.flatnonzero(known.any(axis=0))
+        if rows.size == 0:
+            return Grid(self.cells[:0, :0], self.resolution_m, self.map_from_grid)
+        row, col = int(rows[0]), int(cols[0])
+        corner = Sim2(col * self.resolution_m, row * self.resolution_m)
+        cells = self.cells[row : int(rows[-1]) + 1, col : int(cols[-1]) + 1]
+        return Grid(cells, self.resolution_m, self.map_from_grid @ corner)

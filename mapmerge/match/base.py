@@ -1,0 +1,74 @@
+"""What every matcher offers and returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+from mapmerge.config import MergeConfig
+from mapmerge.evidence import Evidence
+from mapmerge.grid import Grid
+from mapmerge.reasons import Reason
+from mapmerge.sim2 import Sim2
+from mapmerge.verify import Scores
+
+PreparedT = TypeVar("PreparedT")
+
+
+@dataclass(frozen=True, slots=True)
+class Rival:
+    """Another placement of the same pair, distinct from the best one.
+
+    Parameters
+    ----------
+    target_from_source
+        Where it would put the source's map frame in the target's.
+    score_m
+        Its score, to be compared with `Scores.score_m` of the match.
+    """
+
+    target_from_source: Sim2
+    score_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Match:
+    """The outcome for a pair of maps, refused or not.
+
+    Parameters
+    ----------
+    target_from_source
+        Best placement found, between the two map frames; None if there was none.
+    scores
+        Its figures; None if there was no placement.
+    accepted
+        Whether it passed every test.
+    reason
+        What decided.
+    rivals
+        Distinct placements of the same pair, best first.
+    evidence
+        What each step of the matcher saw, in order.
+    """
+
+    target_from_source: Sim2 | None
+    scores: Scores | None
+    accepted: bool
+    reason: Reason
+    rivals: tuple[Rival, ...] = ()
+    evidence: tuple[Evidence, ...] = ()
+
+
+class Matcher(Protocol[PreparedT]):
+    """A method that finds where one map lies on another.
+
+    A matcher has no state: what it computes for one map alone is returned by `prepare` and kept by the caller.
+    """
+
+    def prepare(self, grid: Grid, resolution_m: float, config: MergeConfig) -> PreparedT:
+        """Return all that depends on one map only, at a resolution that is not finer than the map's own."""
+        ...
+
+    def match(self, target: PreparedT, source: PreparedT, config: MergeConfig) -> Match:
+        """Return where the source's map lies in the target's map frame, or why that cannot be said."""
+        ...

@@ -1,0 +1,64 @@
+"""Rotations between two maps from their orientation spectra.
+
+The projection of the walls on an axis is sharp where walls stand at right angles to it: the energy of the Radon
+transform (paper, equation 16) over its angle tells the directions of a building's walls, whatever the shift. The
+spectra of two maps of one place are the same but for their turn.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapmerge.sim2 import Points
+
+Spectrum = NDArray[np.float64]
+
+
+def orientation_spectrum(walls_m: Points, angle_step_rad: float, bin_m: float) -> Spectrum:
+    """Return the Radon energy of the walls for angles from 0 to π, shape (A,), with mean 0 and norm 1.
+
+    Parameters
+    ----------
+    walls_m
+        Wall points, shape (N, 2).
+    angle_step_rad
+        Step of the angles; rounded so that a whole number of steps makes π.
+    bin_m
+        Width of a bin of the projections.
+    """
+    angles = max(1, round(np.pi / angle_step_rad))
+    if len(walls_m) < 2:
+        return np.zeros(angles)
+    centred = walls_m - walls_m.mean(axis=0)
+    reach_m = float(np.hypot(centred[:, 0], centred[:, 1]).max())
+    bins = int(np.ceil(2 * reach_m / bin_m)) + 2
+    energy = np.empty(angles)
+    for index, angle in enumerate(np.arange(angles) * np.pi / angles):
+        offset_m = centred @ (np.cos(angle), np.sin(angle))
+        counts = np.bincount(((offset_m + reach_m) / bin_m).astype(np.intp), minlength=bins)
+        # neighbouring bins are summed so that a wall on the border of two bins counts in full
+        energy[index] = np.square(counts[:-1] + counts[1:], dtype=np.float64).sum()
+    energy -= energy.mean()
+    norm = float(np.linalg.norm(energy))
+    return energy / norm if norm > 0 else energy
+
+
+def spectrum_correlation(target: Spectrum, source: Spectrum) -> Spectrum:
+    """Return how well the source's spectrum, turned by each angle, fits the target's: shape (A,), −1 to 1."""
+    product = np.fft.rfft(target) * np.conj(np.fft.rfft(source))
+    return np.fft.irfft(product, len(target))
+
+
+def rotation_peaks(correlation: Spectrum, count: int) -> tuple[float, ...]:
+    """Return up to ``count`` turns in [0, π) at which the spectra agree best, best first.
+
+    Peaks are refined between the steps by the parabola through three values.
+    """
+    before, after = np.roll(correlation, 1), np.roll(correlation, -1)
+    peaks = np.flatnonzero((correlation >= before) & (correlation > after))
+    best = peaks[np.argsort(-correlation[peaks], kind="stable")][:count]
+    curvature = before[best] - 2 * correlation[best] + after[best]
+    shift = np.where(curvature < 0, 0.5 * (before[best] - after[best]) / np.minimum(curvature, -1e-12), 0.0)
+    step_rad = np.pi / len(correlation)
+    return tuple(float(angle) for angle in ((best + shift) * step_rad) % np.pi)

@@ -1,0 +1,318 @@
+"""The incremental merger: one step for each timestamp at which maps changed.
+
+`MergeState` is the only state there is. It is a value: `step` returns the next one and leaves the old one as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from itertools import combinations
+from typing import Any
+
+from mapmerge.config import MergeConfig
+from mapmerge.errors import ConfigError
+from mapmerge.fuse import Agreement, Fusion, Layer, fuse
+from mapmerge.graph import Edge, Forest, Placement, place
+from mapmerge.grid import Grid
+from mapmerge.match import Match, load_matcher
+from mapmerge.reasons import Reason, ReasonCode
+from mapmerge.sim2 import IDENTITY, Sim2
+
+Pair = tuple[str, str]
+
+
+class Status(StrEnum):
+    """What became of a robot's map."""
+
+    REFERENCE = "reference"
+    MERGED = "merged"
+    UNMERGED = "unmerged"
+    NO_MAP = "no_map"
+
+
+class ChangeKind(StrEnum):
+    """How a robot's placement changed."""
+
+    PLACED = "placed"
+    MOVED = "moved"
+    WITHDRAWN = "withdrawn"
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A robot's map was placed, moved or withdrawn."""
+
+    robot: str
+    kind: ChangeKind
+    reason: Reason
+
+
+@dataclass(frozen=True, slots=True)
+class RobotOutcome:
+    """What is known of one robot's map.
+
+    Parameters
+    ----------
+    status, reason
+        What became of it, and why.
+    merged_from_map
+        Where its map frame lies in the merged frame; None if it is not placed.
+    agreement
+        Of a placed map with all other placed maps; of one that is not placed, that of its best refused candidate.
+    placement
+        Its place in its component; None without a map.
+    shown_pair
+        The match that placed it or, if it is not placed, its best refused one.
+    """
+
+    status: Status
+    reason: Reason
+    merged_from_map: Sim2 | None = None
+    agreement: Agreement | None = None
+    placement: Placement | None = None
+    shown_pair: Pair | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MergeResult:
+    """All that is known after a step.
+
+    Parameters
+    ----------
+    robots
+        Outcome of each robot, in the order given, the reference first.
+    grids
+        Latest map of each robot that has one.
+    pairs
+        Latest match of each pair of robots with maps, target first.
+    merged
+        The fused map, in the merged frame, which is the reference's map frame; None until the reference has a map.
+    updated
+        Robots whose map changed in this step.
+    changes
+        What was placed, moved or withdrawn in this step.
+    """
+
+    robots: Mapping[str, RobotOutcome]
+    grids: Mapping[str, Grid]
+    pairs: Mapping[Pair, Match]
+    merged: Grid | None
+    updated: tuple[str, ...]
+    changes: tuple[Change, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MergeState:
+    """What the merger carries from one step to the next.
+
+    Parameters
+    ----------
+    result
+        The last result.
+    prepared
+        What the matcher computed for one map at one resolution, for the latest maps only.
+    reported
+        Placements as they were last reported in a change.
+    """
+
+    result: MergeResult
+    prepared: Mapping[tuple[str, float], Any] = field(default_factory=dict)
+    reported: Mapping[str, Sim2] = field(default_factory=dict)
+
+    @staticmethod
+    def initial(robots: Sequence[str]) -> MergeState:
+        """Return the state before any map, for these robots; the first is the reference.
+
+        Raises
+        ------
+        ConfigError
+            If there is no robot, or one twice.
+        """
+        if not robots or len(set(robots)) != len(robots):
+            raise ConfigError(f"robots are {list(robots)}; expected at least one, each once")
+        waiting = Reason(ReasonCode.NO_MAP, "no map yet")
+        outcomes = {robot: RobotOutcome(Status.NO_MAP, waiting) for robot in robots}
+        return MergeState(MergeResult(outcomes, {}, {}, None, (), ()))
+
+
+def step(state: MergeState, updates: Mapping[str, Grid], config: MergeConfig) -> tuple[MergeState, MergeResult]:
+    """Take in new maps and return what is known then.
+
+    Maps that say what was known already cost nothing: pairs of unchanged maps are not matched again.
+    """
+    robots = tuple(state.result.robots)
+    updated = tuple(robot for robot in robots if _is_new(updates.get(robot), state.result.grids.get(robot)))
+    if not updated:
+        result = replace(state.result, updated=(), changes=())
+        return replace(state, result=result), result
+    grids = {
+        robot: updates[robot] if robot in updated else state.result.grids[robot]
+        for robot in robots
+        if robot in updated or robot in state.result.grids
+    }
+    pairs, prepared = _matched(state, grids, updated, config)
+    forest = _placed(grids, pairs, config)
+    pairs = _without_contradicted(pairs, forest)
+    layers = _layers(robots[0], grids, forest)
+    fusion = fuse(list(layers.values()), grids[robots[0]], config.cells) if layers else None
+    outcomes = _outcomes(robots, pairs, forest, layers, fusion)
+    changes, reported = _changes(robots[0], outcomes, state.reported, grids, config)
+    result = MergeResult(outcomes, grids, pairs, fusion.grid if fusion else None, updated, changes)
+    return MergeState(result, prepared, reported), result
+
+
+def _is_new(update: Grid | None, known: Grid | None) -> bool:
+    return update is not None and (known is None or not update.same_as(known))
+
+
+def _matched(
+    state: MergeState, grids: Mapping[str, Grid], updated: Sequence[str], config: MergeConfig
+) -> tuple[dict[Pair, Match], dict[tuple[str, float], Any]]:
+    """Match every pair of which a map changed; keep the matches of the others."""
+    matcher = load_matcher(config.method)
+    prepared = {key: value for key, value in state.prepared.items() if key[0] not in updated}
+    pairs: dict[Pair, Match] = {}
+    for pair in combinations(grids, 2):
+        if pair in state.result.pairs and not set(pair) & set(updated):
+            pairs[pair] = state.result.pairs[pair]
+            continue
+        resolution_m = max(config.search.working_cell_m, *(grids[robot].resolution_m for robot in pair))
+        for robot in pair:
+            if (robot, resolution_m) not in prepared:
+                prepared[robot, resolution_m] = matcher.prepare(grids[robot], resolution_m, config)
+        target, source = (prepared[robot, resolution_m] for robot in pair)
+        pairs[pair] = matcher.match(target, source, config)
+    return pairs, prepared
+
+
+def _placed(grids: Mapping[str, Grid], pairs: Mapping[Pair, Match], config: MergeConfig) -> Forest:
+    edges = [
+        Edge(target, source, match.target_from_source, match.scores.score_m, _centre_m(grids[source]))
+        for (target, source), match in pairs.items()
+        if match.accepted and match.target_from_source is not None and match.scores is not None
+    ]
+    limits = config.verify
+    return place(list(grids), edges, distance_m=limits.distinct_m, angle_rad=limits.distinct_rad)
+
+
+def _without_contradicted(pairs: dict[Pair, Match], forest: Forest) -> dict[Pair, Match]:
+    """Refuse the matches that the placement of all robots contradicts."""
+    message = "the pair fits by itself, but contradicts better placements of the same robots"
+    reason = Reason(ReasonCode.INCONSISTENT, message)
+    refused = {(edge.target, edge.source) for edge in forest.contradicted}
+    return {
+        pair: replace(match, accepted=False, reason=reason) if pair in refused else match
+        for pair, match in pairs.items()
+    }
+
+
+def _layers(reference: str, grids: Mapping[str, Grid], forest: Forest) -> dict[str, Layer]:
+    """Return the maps that are linked to the reference; none until it has a map."""
+    if reference not in grids:
+        return {}
+    return {
+        robot: Layer(grids[robot], placement.component_from_map)
+        for robot, placement in forest.placements.items()
+        if placement.component == reference
+    }
+
+
+def _outcomes(
+    robots: Sequence[str],
+    pairs: Mapping[Pair, Match],
+    forest: Forest,
+    layers: Mapping[str, Layer],
+    fusion: Fusion | None,
+) -> dict[str, RobotOutcome]:
+    agreements = dict(zip(layers, fusion.agreements, strict=True)) if fusion else {}
+    outcomes: dict[str, RobotOutcome] = {}
+    for robot in robots:
+        placement = forest.placements.get(robot)
+        if placement is None:
+            outcomes[robot] = RobotOutcome(Status.NO_MAP, Reason(ReasonCode.NO_MAP, "no map yet"))
+        elif robot in layers:
+            outcomes[robot] = _placed_outcome(robot, placement, pairs, agreements[robot])
+        else:
+            outcomes[robot] = _unplaced_outcome(robots[0], robot, placement, pairs, has_reference=bool(layers))
+    return outcomes
+
+
+def _placed_outcome(
+    robot: str, placement: Placement, pairs: Mapping[Pair, Match], agreement: Agreement
+) -> RobotOutcome:
+    if placement.via is None:
+        reason = Reason(ReasonCode.REFERENCE, "its map frame is the merged frame")
+        return RobotOutcome(Status.REFERENCE, reason, IDENTITY, agreement, placement)
+    pair = (robot, placement.via) if (robot, placement.via) in pairs else (placement.via, robot)
+    match = pairs[pair]
+    reason = Reason(match.reason.code, f"placed on {placement.via}: {match.reason.message}")
+    return RobotOutcome(Status.MERGED, reason, placement.component_from_map, agreement, placement, pair)
+
+
+def _unplaced_outcome(
+    reference: str, robot: str, placement: Placement, pairs: Mapping[Pair, Match], *, has_reference: bool
+) -> RobotOutcome:
+    pair = _best_refused(reference, robot, pairs)
+    match = pairs[pair] if pair else None
+    scores = match.scores if match else None
+    agreement = Agreement(scores.acceptance, scores.overlap_m2, scores.overlap_fraction) if scores else None
+    if not has_reference:
+        reason = Reason(ReasonCode.NO_REFERENCE_MAP, f"the reference {reference} has no map yet")
+    elif any(match.accepted for pair, match in pairs.items() if robot in pair):
+        message = f"its map fits that of {_partner(robot, pairs)}, but neither is linked to the reference {reference}"
+        reason = Reason(ReasonCode.OTHER_COMPONENT, message)
+    elif match is None or pair is None:
+        reason = Reason(ReasonCode.NO_CANDIDATE, "there is no other map to be placed on")
+    else:
+        other = pair[0] if pair[1] == robot else pair[1]
+        reason = Reason(match.reason.code, f"not placed on {other}: {match.reason.message}")
+    return RobotOutcome(Status.UNMERGED, reason, None, agreement, placement, pair)
+
+
+def _partner(robot: str, pairs: Mapping[Pair, Match]) -> str:
+    return next(a if b == robot else b for (a, b), match in pairs.items() if match.accepted and robot in (a, b))
+
+
+def _best_refused(reference: str, robot: str, pairs: Mapping[Pair, Match]) -> Pair | None:
+    """Return the refused pair of this robot that says most: the highest score, the reference before others."""
+
+    def rank(pair: Pair) -> tuple[float, bool]:
+        scores = pairs[pair].scores
+        return (scores.score_m if scores else float("-inf"), reference in pair)
+
+    refused = [pair for pair, match in pairs.items() if robot in pair and not match.accepted]
+    return max(refused, key=rank, default=None)
+
+
+def _changes(
+    reference: str,
+    outcomes: Mapping[str, RobotOutcome],
+    reported: Mapping[str, Sim2],
+    grids: Mapping[str, Grid],
+    config: MergeConfig,
+) -> tuple[tuple[Change, ...], dict[str, Sim2]]:
+    """Compare the placements with those reported last."""
+    changes: list[Change] = []
+    now: dict[str, Sim2] = {}
+    for robot, outcome in outcomes.items():
+        pose, before = outcome.merged_from_map, reported.get(robot)
+        if robot == reference:
+            continue
+        if pose is None:
+            if before is not None:
+                changes.append(Change(robot, ChangeKind.WITHDRAWN, outcome.reason))
+            continue
+        now[robot] = pose
+        if before is None:
+            changes.append(Change(robot, ChangeKind.PLACED, outcome.reason))
+        elif pose.is_close(before, distance_m=config.moved_m, angle_rad=config.moved_rad, at_m=_centre_m(grids[robot])):
+            now[robot] = before
+        else:
+            changes.append(Change(robot, ChangeKind.MOVED, outcome.reason))
+    return tuple(changes), now
+
+
+def _centre_m(grid: Grid) -> tuple[float, float]:
+    return grid.map_from_grid.apply_point(grid.cols * grid.resolution_m / 2, grid.rows * grid.resolution_m / 2)

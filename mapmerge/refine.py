@@ -1,0 +1,87 @@
+"""Alignment of a candidate placement: ICP on the walls (paper, equations 23 and 24), against a distance transform.
+
+The nearest wall of a point is a look-up in the target's labelled distance transform, so a step costs one pass over
+the points. Pairs beyond a distance that narrows are left out: plain ICP pulls good alignments away.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapmerge.config import RefineConfig
+from mapmerge.prepare import PreparedMap
+from mapmerge.sim2 import Points, Sim2
+
+_CONVERGED_M = 1e-4
+_CONVERGED_RAD = 1e-5
+_MIN_PAIRS = 12
+
+
+def refine(target: PreparedMap, walls_m: Points, start: Sim2, config: RefineConfig) -> Sim2:
+    """Return ``target_from_source`` that aligns the source's walls with the target's, searched from ``start``.
+
+    Parameters
+    ----------
+    target
+        The map that stays.
+    walls_m
+        Wall points of the source in its grid frame, shape (N, 2).
+    start
+        Candidate ``target_from_source``; its scale is kept.
+    """
+    pose = start
+    for reject_m in config.reject_m:
+        for _ in range(config.iterations):
+            step = _icp_step(target, pose.apply(walls_m), reject_m)
+            if step is None:
+                return pose
+            pose = step @ pose
+            if math.hypot(step.x_m, step.y_m) < _CONVERGED_M and abs(step.yaw_rad) < _CONVERGED_RAD:
+                break
+    return pose
+
+
+def evenly(points_m: Points, most: int) -> Points:
+    """Return at most so many of the points, evenly spread over their order."""
+    if len(points_m) <= most:
+        return points_m
+    chosen: NDArray[np.intp] = np.linspace(0, len(points_m) - 1, most).astype(np.intp)
+    return points_m[chosen]
+
+
+def _icp_step(target: PreparedMap, points_m: Points, reject_m: float) -> Sim2 | None:
+    """One step: pair each point with the nearest wall and return the rigid motion that brings them together.
+
+    The motion is that of least squares with the error of each pair taken along the line from the wall to the point,
+    which on straight walls is their normal: points slide along walls freely, so few steps are enough.
+    """
+    index = target.flat_index(points_m)
+    near = target.wall_distance_m.ravel()[index] <= reject_m
+    if int(np.count_nonzero(near)) < _MIN_PAIRS:
+        return None
+    points, index = points_m[near], index[near]
+    error = target.wall_cells_m[target.nearest_wall.ravel()[index]] - points
+    distance = np.hypot(error[:, 0], error[:, 1])
+    # Cauchy weights: what is far apart says less
+    weight = 1.0 / (1.0 + np.square(distance / (0.35 * reject_m)))
+    centre = points.mean(axis=0)
+    return _rigid_motion(points - centre, error, weight, centre)
+
+
+def _rigid_motion(arms: Points, error: Points, weight: NDArray[np.float64], centre: Points) -> Sim2:
+    """Return the motion about ``centre`` that best moves the points by their errors (weighted, closed form)."""
+    total = weight.sum()
+    mean_arm = (weight[:, None] * arms).sum(axis=0) / total
+    mean_error = (weight[:, None] * error).sum(axis=0) / total
+    before, after = arms - mean_arm, arms + error - (mean_arm + mean_error)
+    cross = float((weight * (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])).sum())
+    dot = float((weight * (before * after).sum(axis=1)).sum())
+    yaw_rad = math.atan2(cross, dot)
+    turned = Sim2(yaw_rad=yaw_rad)
+    pivot = centre + mean_arm
+    moved_x, moved_y = turned.apply_point(float(pivot[0]), float(pivot[1]))
+    shift = pivot + mean_error
+    return Sim2(float(shift[0]) - moved_x, float(shift[1]) - moved_y, yaw_rad)

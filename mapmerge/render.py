@@ -1,0 +1,187 @@
+"""Pictures of evidence. Nothing here decides anything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapmerge.evidence import CurvesEvidence, Evidence, OverlayEvidence, SurfaceEvidence
+from mapmerge.prepare import CELL_FREE, CELL_UNKNOWN, PreparedMap
+from mapmerge.sim2 import Points
+
+Rgb = NDArray[np.uint8]
+Colour = tuple[int, int, int]
+
+MAX_SIDE_PX = 1024
+
+_PAPER: Colour = (255, 255, 255)
+_INK: Colour = (60, 60, 60)
+_FAINT: Colour = (222, 222, 222)
+_SERIES: tuple[Colour, ...] = ((31, 119, 180), (255, 127, 14), (44, 160, 44), (148, 103, 189))
+_MARK: Colour = (214, 39, 40)
+_UNKNOWN: Colour = (205, 205, 205)
+_FREE_ONE: Colour = (238, 238, 238)
+_FREE_BOTH: Colour = (255, 255, 255)
+_WALL_TARGET: Colour = (70, 110, 180)
+_WALL_SOURCE: Colour = (225, 150, 50)
+_AGREE: Colour = (20, 150, 60)
+_DISAGREE: Colour = (220, 30, 40)
+
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A picture of one step of a method.
+
+    Parameters
+    ----------
+    step
+        Name of the step, fit for a topic name.
+    title
+        What is shown, in words.
+    rgb
+        Shape (rows, columns, 3), uint8, row 0 at the top; its longest side is at most `MAX_SIDE_PX`.
+    """
+
+    step: str
+    title: str
+    rgb: Rgb
+
+
+def render(evidence: Evidence) -> Picture:
+    """Return a picture of what a matcher saw in one step."""
+    match evidence:
+        case CurvesEvidence():
+            rgb = _curves(evidence)
+        case SurfaceEvidence():
+            rgb = _surface(evidence)
+        case OverlayEvidence():
+            rgb = _overlay(evidence)
+    return Picture(evidence.step, evidence.title, rgb)
+
+
+def _curves(evidence: CurvesEvidence) -> Rgb:
+    """One panel for each curve, over a common axis."""
+    width, panel, left, right, top = 960, 170, 24, 936, 40
+    height = top + panel * len(evidence.curves) + 46
+    image = np.full((height, width, 3), 255, np.uint8)
+    _text(image, evidence.title, (left, 26), 0.6)
+    span = evidence.stop - evidence.start
+
+    def x_px(abscissa: float) -> int:
+        return left + round((abscissa - evidence.start) / span * (right - left))
+
+    for index, curve in enumerate(evidence.curves):
+        low, high = top + panel * (index + 1) - 12, top + panel * index + 18
+        for mark in evidence.marks:
+            cv2.line(image, (x_px(mark), high), (x_px(mark), low), _FAINT if index < 2 else _MARK, 1)
+        cv2.line(image, (left, low), (right, low), _INK, 1)
+        _polyline(image, curve.values, (left, right), (low, high), _SERIES[index % len(_SERIES)])
+        _text(image, curve.label, (left + 6, high + 8), 0.5, _SERIES[index % len(_SERIES)])
+    for tick in np.linspace(evidence.start, evidence.stop, 7):
+        _text(image, f"{tick:g}", (x_px(float(tick)) - 10, height - 26), 0.45)
+    _text(image, evidence.axis, (width // 2 - 40, height - 8), 0.5)
+    return image
+
+
+def _polyline(
+    image: Rgb, values: NDArray[np.float64], x_px: tuple[int, int], y_px: tuple[int, int], colour: Colour
+) -> None:
+    low, high = float(values.min()), float(values.max())
+    scaled = (values - low) / (high - low) if high > low else np.zeros_like(values)
+    x = x_px[0] + np.arange(len(values)) / len(values) * (x_px[1] - x_px[0])
+    y = y_px[0] + scaled * (y_px[1] - y_px[0])
+    points = np.rint(np.stack([x, y], axis=1)).astype(np.int32).reshape(-1, 1, 2)
+    cv2.polylines(image, [points], isClosed=False, color=colour, thickness=2, lineType=cv2.LINE_AA)
+
+
+def _surface(evidence: SurfaceEvidence) -> Rgb:
+    """Brighter is better; followed peaks are circled, the chosen one is filled."""
+    values = evidence.values
+    low, high = float(np.percentile(values, 5)), float(values.max())
+    scaled = np.clip((values - low) / (high - low) * 255 if high > low else values * 0, 0, 255)
+    zoom = MAX_SIDE_PX / max(values.shape)
+    size = (max(1, int(values.shape[1] * zoom)), max(1, int(values.shape[0] * zoom)))
+    interpolation = cv2.INTER_AREA if zoom < 1 else cv2.INTER_LINEAR
+    grey = cv2.resize(scaled.astype(np.uint8)[::-1], size, interpolation=interpolation)
+    image: Rgb = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_VIRIDIS)[:, :, ::-1], np.uint8)
+    for row, col in evidence.marks:
+        cv2.circle(image, _pixel(row, col, values.shape, zoom), 9, _PAPER, 1, cv2.LINE_AA)
+    if evidence.chosen is not None:
+        cv2.circle(image, _pixel(*evidence.chosen, values.shape, zoom), 14, _MARK, 3, cv2.LINE_AA)
+    _banner(image, evidence.title)
+    return image
+
+
+def _pixel(row: int, col: int, shape: tuple[int, ...], zoom: float) -> tuple[int, int]:
+    return int((col + 0.5) * zoom), int((shape[0] - row - 0.5) * zoom)
+
+
+def _overlay(evidence: OverlayEvidence) -> Rgb:
+    """Both maps in the target's grid frame, seen from above with y upwards."""
+    target, source, pose = evidence.target, evidence.source, evidence.target_from_source
+    corners = np.concatenate([_corners(target), pose.apply(_corners(source))])
+    low, high = corners.min(axis=0) - 0.5, corners.max(axis=0) + 0.5
+    pixel_m = max(target.resolution_m / 2, float((high - low).max()) / MAX_SIDE_PX)
+    cols, rows = (max(1, int(side / pixel_m)) for side in high - low)
+
+    image = _ground(evidence, low, pixel_m, rows, cols)
+    back = pose.inverse()
+    agree, disagree = [], []
+    walls_m = pose.apply(source.wall_cells_m)
+    for here, walls, there, at in (
+        (target, walls_m, _WALL_SOURCE, walls_m),
+        (source, back.apply(target.wall_cells_m), _WALL_TARGET, target.wall_cells_m),
+    ):
+        index = here.flat_index(walls)
+        matched = here.wall_distance_m.ravel()[index] <= evidence.tolerance_m
+        violated = ~matched & (here.classes.ravel()[index] == CELL_FREE)
+        _dots(image, at[~matched & ~violated], low, pixel_m, there)
+        agree.append(at[matched])
+        disagree.append(at[violated])
+    _dots(image, np.concatenate(agree), low, pixel_m, _AGREE)
+    _dots(image, np.concatenate(disagree), low, pixel_m, _DISAGREE)
+    _banner(image, evidence.title)
+    return image
+
+
+def _corners(prepared: PreparedMap) -> Points:
+    width_m, height_m = prepared.extent_m
+    return np.array([[0.0, 0.0], [width_m, 0.0], [0.0, height_m], [width_m, height_m]])
+
+
+def _ground(evidence: OverlayEvidence, low: Points, pixel_m: float, rows: int, cols: int) -> Rgb:
+    """Paint what is unknown, known by one map, free in both."""
+    row, col = np.mgrid[rows - 1 : -1 : -1, 0:cols]
+    points_m = np.stack([col.ravel() + 0.5, row.ravel() + 0.5], axis=1) * pixel_m + low
+    here = evidence.target.classes.ravel()[evidence.target.flat_index(points_m)]
+    source_m = evidence.target_from_source.inverse().apply(points_m)
+    there = evidence.source.classes.ravel()[evidence.source.flat_index(source_m)]
+    image = np.full((rows * cols, 3), _FREE_ONE, np.uint8)
+    image[(here == CELL_UNKNOWN) & (there == CELL_UNKNOWN)] = _UNKNOWN
+    image[(here == CELL_FREE) & (there == CELL_FREE)] = _FREE_BOTH
+    return image.reshape(rows, cols, 3)
+
+
+def _dots(image: Rgb, points_m: Points, low: Points, pixel_m: float, colour: Colour) -> None:
+    rows, cols = image.shape[:2]
+    pixel = np.floor((points_m - low) / pixel_m).astype(np.intp)
+    row, col = rows - 1 - pixel[:, 1], pixel[:, 0]
+    for down, right in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        image[np.clip(row + down, 0, rows - 1), np.clip(col + right, 0, cols - 1)] = colour
+
+
+def _banner(image: Rgb, title: str) -> None:
+    """Write the title on a strip at the top, as large as fits."""
+    size = min(0.6, image.shape[1] / (len(title) * 16))
+    cv2.rectangle(image, (0, 0), (image.shape[1], int(36 * size / 0.6)), _PAPER, cv2.FILLED)
+    _text(image, title, (8, int(24 * size / 0.6)), size)
+
+
+def _text(image: Rgb, text: str, at: tuple[int, int], size: float, colour: Colour = _INK) -> None:
+    plain = text.replace("°", " deg").replace("²", "2")
+    cv2.putText(image, plain, at, _FONT, size, colour, 1, cv2.LINE_AA)

@@ -1,0 +1,93 @@
+"""Rigid and similarity transforms of the plane, Sim(2).
+
+Names read right to left: ``merged_from_map = merged_from_other @ other_from_map``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Points = NDArray[np.float64]
+
+
+def wrap_angle(angle_rad: float) -> float:
+    """Return the angle in (−π, π] that points the same way."""
+    wrapped = math.remainder(angle_rad, math.tau)
+    return math.pi if wrapped == -math.pi else wrapped
+
+
+@dataclass(frozen=True, slots=True)
+class Sim2:
+    """``target_from_source``: scale, turn, then shift (paper, equation 2).
+
+    With ``scale`` 1, the default, this is a rigid transform, SE(2).
+
+    Parameters
+    ----------
+    x_m, y_m
+        Where the source frame's origin lies in the target frame.
+    yaw_rad
+        Direction of the source frame's x axis in the target frame; kept in (−π, π].
+    scale
+        Target metres per source metre; positive.
+    """
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_rad: float = 0.0
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "yaw_rad", wrap_angle(self.yaw_rad))
+
+    def __matmul__(self, other: Sim2) -> Sim2:
+        """Return the transform that applies ``other`` first, then this one."""
+        x_m, y_m = self.apply_point(other.x_m, other.y_m)
+        return Sim2(x_m, y_m, self.yaw_rad + other.yaw_rad, self.scale * other.scale)
+
+    def inverse(self) -> Sim2:
+        """Return ``source_from_target``."""
+        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        return Sim2(
+            -(cos * self.x_m + sin * self.y_m) / self.scale,
+            (sin * self.x_m - cos * self.y_m) / self.scale,
+            -self.yaw_rad,
+            1.0 / self.scale,
+        )
+
+    def apply_point(self, x_m: float, y_m: float) -> tuple[float, float]:
+        """Return where one point of the source frame lies in the target frame."""
+        cos, sin = self.scale * math.cos(self.yaw_rad), self.scale * math.sin(self.yaw_rad)
+        return cos * x_m - sin * y_m + self.x_m, sin * x_m + cos * y_m + self.y_m
+
+    def apply(self, points_m: Points) -> Points:
+        """Return points, shape (N, 2), of the source frame in the target frame."""
+        return points_m @ self.linear.T + (self.x_m, self.y_m)
+
+    @property
+    def linear(self) -> Points:
+        """The scaled rotation, shape (2, 2)."""
+        cos, sin = self.scale * math.cos(self.yaw_rad), self.scale * math.sin(self.yaw_rad)
+        return np.array([[cos, -sin], [sin, cos]])
+
+    @property
+    def matrix(self) -> Points:
+        """The homogeneous matrix of equation 2, shape (3, 3)."""
+        matrix = np.eye(3)
+        matrix[:2, :2] = self.linear
+        matrix[:2, 2] = self.x_m, self.y_m
+        return matrix
+
+    def is_close(self, other: Sim2, *, distance_m: float, angle_rad: float, at_m: tuple[float, float]) -> bool:
+        """Tell whether both transforms take the source point ``at_m`` to about the same pose."""
+        x_m, y_m = self.apply_point(*at_m)
+        other_x_m, other_y_m = other.apply_point(*at_m)
+        near = math.hypot(x_m - other_x_m, y_m - other_y_m) <= distance_m
+        return near and abs(wrap_angle(self.yaw_rad - other.yaw_rad)) <= angle_rad
+
+
+IDENTITY = Sim2()

@@ -1,0 +1,45 @@
+"""The decoded messages that the rest of the program works on, whatever recording they came from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mapmerge.grid import Cells, Grid
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GridMessage:
+    """A ``nav_msgs/OccupancyGrid``.
+
+    Parameters
+    ----------
+    stamp_ns
+        ``header.stamp``; 0 if it was not set.
+    frame_id
+        ``header.frame_id`` as recorded.
+    grid
+        The map; its cells are a read-only view of the message where possible.
+    """
+
+    stamp_ns: int
+    frame_id: str
+    grid: Grid
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UpdateMessage:
+    """A ``map_msgs/OccupancyGridUpdate``: new cells for a rectangle of the last full grid.
+
+    Parameters
+    ----------
+    col, row
+        Cell of the full grid that the rectangle's cell (0, 0) replaces (``x`` and ``y`` of the message).
+    cells
+        Shape (rows, columns), int8, as in `Grid`.
+    """
+
+    stamp_ns: int
+    frame_id: str
+    col: int
+    row: int
+    cells: Cells
