@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mapmerge.evidence import CurvesEvidence, Evidence, OverlayEvidence, SurfaceEvidence
 from mapmerge.prepare import CELL_FREE, CELL_UNKNOWN, PreparedMap
-from mapmerge.sim2 import Points
+from mapmerge.sim2 import Points, Sim2
 
 Rgb = NDArray[np.uint8]
 Colour = tuple[int, int, int]
@@ -155,16 +155,24 @@ def _corners(prepared: PreparedMap) -> Points:
 
 
 def _ground(evidence: OverlayEvidence, low: Points, pixel_m: float, rows: int, cols: int) -> Rgb:
-    """Paint what is unknown, known by one map, free in both."""
-    row, col = np.mgrid[rows - 1 : -1 : -1, 0:cols]
-    points_m = np.stack([col.ravel() + 0.5, row.ravel() + 0.5], axis=1) * pixel_m + low
-    here = evidence.target.classes.ravel()[evidence.target.flat_index(points_m)]
-    source_m = evidence.target_from_source.inverse().apply(points_m)
-    there = evidence.source.classes.ravel()[evidence.source.flat_index(source_m)]
-    image = np.full((rows * cols, 3), _FREE_ONE, np.uint8)
-    image[(here == CELL_UNKNOWN) & (there == CELL_UNKNOWN)] = _UNKNOWN
-    image[(here == CELL_FREE) & (there == CELL_FREE)] = _FREE_BOTH
-    return image.reshape(rows, cols, 3)
+    """Paint what is unknown, known by one map, free in both, in shades of grey."""
+    target_from_pixel = Sim2(float(low[0]), float(low[1]), scale=pixel_m)
+    here = _classes_at(evidence.target, target_from_pixel, rows, cols)
+    there = _classes_at(evidence.source, evidence.target_from_source.inverse() @ target_from_pixel, rows, cols)
+    shade = np.full((rows, cols), _FREE_ONE[0], np.uint8)
+    shade[(here == CELL_UNKNOWN) & (there == CELL_UNKNOWN)] = _UNKNOWN[0]
+    shade[(here == CELL_FREE) & (there == CELL_FREE)] = _FREE_BOTH[0]
+    return np.repeat(shade[::-1, :, None], 3, axis=2)
+
+
+def _classes_at(prepared: PreparedMap, grid_from_pixel: Sim2, rows: int, cols: int) -> Rgb:
+    """Return the class of the cell at each pixel's centre, row 0 at the lowest y."""
+    linear = grid_from_pixel.linear / prepared.resolution_m
+    first = np.array(grid_from_pixel.apply_point(0.5, 0.5)) / prepared.resolution_m + prepared.margin - 0.5
+    matrix = np.hstack([linear, first[:, None]])
+    flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+    warped = cv2.warpAffine(prepared.classes, matrix, (cols, rows), flags=flags, borderValue=CELL_UNKNOWN)
+    return np.asarray(warped, np.uint8)
 
 
 def _dots(image: Rgb, points_m: Points, low: Points, pixel_m: float, colour: Colour) -> None:
@@ -183,5 +191,4 @@ def _banner(image: Rgb, title: str) -> None:
 
 
 def _text(image: Rgb, text: str, at: tuple[int, int], size: float, colour: Colour = _INK) -> None:
-    plain = text.replace("°", " deg").replace("²", "2")
-    cv2.putText(image, plain, at, _FONT, size, colour, 1, cv2.LINE_AA)
+    cv2.putText(image, text, at, _FONT, size, colour, 1, cv2.LINE_AA)

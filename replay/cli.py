@@ -1,0 +1,277 @@
+"""The command line: thin over the library, and the one place that turns errors into a line and an exit status."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from replay import __version__
+from replay.errors import OutputError, ReplayError, UsageError
+
+if TYPE_CHECKING:
+    from replay.events import Report
+    from replay.options import OutputOptions, RunOptions
+
+EXIT_DONE = 0
+EXIT_NOT_ALL_MERGED = 1
+EXIT_BAD_INPUT = 2
+EXIT_FAILED = 3
+EXIT_INTERRUPTED = 130
+
+_EXAMPLES = """\
+examples:
+  replay info run.mcap
+  replay merge run.mcap --robots r1,r2
+  replay merge alpha=alpha_bag/ bravo=bravo_bag/ -o out/floor.mcap
+  replay merge today.mcap old=map.yaml --robots r1,old --require-all
+"""
+
+_MERGE_EXAMPLES = """\
+examples:
+  replay merge run.mcap --robots r1,r2       r1 is the reference: its map frame becomes the merged frame
+  replay merge a=alpha.bag b=bravo/          one recording a robot, whatever its map topic is called
+  replay merge run.mcap --topic '/{robot}/slam/map'
+  replay merge run.mcap --start 60 --stop 300 --no-rrd --json
+
+exit status: 0 done; 1 a robot was not merged and --require-all was given; 2 bad usage or input;
+3 an output could not be written, or a bug; 130 interrupted
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program and return its exit status."""
+    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        return _dispatch(_parser().parse_args(arguments))
+    except ReplayError as error:
+        print(f"replay: error: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("replay: interrupted; nothing was written", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        # whoever read our output has gone; keep Python from complaining about it at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_FAILED
+    except Exception:  # noqa: BLE001 - a bug of ours must still end with a status and a word
+        import traceback
+
+        traceback.print_exc()
+        print(f"replay: this is a bug in replay {__version__}; please report it with the lines above", file=sys.stderr)
+        return EXIT_FAILED
+
+
+def _terminate(_number: int, _frame: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _dispatch(options: argparse.Namespace) -> int:
+    return _info(options) if options.command == "info" else _merge(options)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="replay",
+        description="Merge the occupancy grid maps that several robots recorded, offline, at each timestamp.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"replay {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    merge = commands.add_parser(
+        "merge",
+        help="merge the maps of a recording and write what came of it",
+        description="Merge the maps of one or more recordings at each timestamp, and write the outcome to a new MCAP, "
+        "a Rerun recording and a JSON report.",
+        epilog=_MERGE_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    _input_arguments(merge)
+    _output_arguments(merge)
+    info = commands.add_parser(
+        "info",
+        help="list what recordings hold and what would be merged",
+        description="List format, duration, map topics, messages, sizes and resolutions of recordings, and what "
+        "would be merged.",
+        allow_abbrev=False,
+    )
+    _input_arguments(info)
+    return parser
+
+
+def _input_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "runs",
+        nargs="+",
+        metavar="RUN",
+        help="a recording, as PATH or ROBOT=PATH: .bag, ROS 2 bag folder, .db3, .mcap, or a saved map's .yaml",
+    )
+    group = parser.add_argument_group("which maps")
+    group.add_argument("--robots", metavar="R1,R2,…", help="robots to merge, the reference first (default: all)")
+    group.add_argument(
+        "--topic",
+        action="append",
+        default=[],
+        metavar="[ROBOT=]TOPIC",
+        help="map topic, for one robot or with {robot} for all; may be repeated",
+    )
+    times = parser.add_argument_group("time")
+    times.add_argument(
+        "--clock",
+        choices=("header", "log"),
+        default="header",
+        help="what times are taken from; log is used where headers have none (default: %(default)s)",
+    )
+    times.add_argument(
+        "--start",
+        metavar="TIME",
+        help="use maps from this time on: seconds after the first map, nanoseconds since 1970 with ns, or ISO 8601",
+    )
+    times.add_argument("--stop", metavar="TIME", help="use maps before this time")
+    times.add_argument(
+        "--reorder-window",
+        metavar="SECONDS",
+        default="5",
+        help="put messages in order of time within this window (default: %(default)s)",
+    )
+    times.add_argument(
+        "--align-starts",
+        action="store_true",
+        help="let recordings whose clocks cannot be the same begin together, on the reference's clock",
+    )
+
+
+def _output_arguments(parser: argparse.ArgumentParser) -> None:
+    outputs = parser.add_argument_group("outputs")
+    outputs.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT.mcap",
+        type=Path,
+        help="the new MCAP, with OUT.rrd and OUT.json beside it (default: NAME.merged.mcap in the current folder)",
+    )
+    outputs.add_argument("--no-rrd", action="store_true", help="write no Rerun recording")
+    outputs.add_argument("--force", action="store_true", help="replace outputs that exist")
+    outputs.add_argument(
+        "--every",
+        metavar="SECONDS",
+        default="0",
+        help="least time between two merged maps in the MCAP; the last is always written (default: at each change)",
+    )
+    outputs.add_argument("--copy-maps", action="store_true", help="copy the robots' own maps to the MCAP")
+    outputs.add_argument(
+        "--images",
+        choices=("none", "changed", "all"),
+        default="changed",
+        help="which intermediate images are written (default: %(default)s)",
+    )
+    outputs.add_argument("--json", action="store_true", help="print the report instead of a table")
+    rules = parser.add_argument_group("rules")
+    rules.add_argument("--strict", action="store_true", help="end with an error at the first message that is unusable")
+    rules.add_argument("--require-all", action="store_true", help="exit with 1 if a robot was not merged")
+
+
+def _run_options(options: argparse.Namespace) -> RunOptions:
+    from replay.options import RunOptions, TimeBound, seconds_to_ns
+    from replay.selection import RunPath, TopicChoice
+
+    return RunOptions(
+        runs=tuple(RunPath.parse(text) for text in options.runs),
+        robots=_robots(options.robots),
+        topics=tuple(TopicChoice.parse(text) for text in options.topic),
+        clock=options.clock,
+        start=TimeBound.parse(options.start) if options.start else None,
+        stop=TimeBound.parse(options.stop) if options.stop else None,
+        reorder_window_ns=seconds_to_ns(options.reorder_window),
+        align_starts=options.align_starts,
+        strict=getattr(options, "strict", False),
+        images=getattr(options, "images", "none"),
+    )
+
+
+def _robots(text: str | None) -> tuple[str, ...] | None:
+    if text is None:
+        return None
+    names = tuple(name.strip() for name in text.split(","))
+    if not all(names) or len(set(names)) != len(names):
+        raise UsageError(f"--robots {text}: expected names with commas between them, each once, such as r1,r2")
+    return names
+
+
+def _output_options(options: argparse.Namespace, run: RunOptions) -> OutputOptions:
+    from replay.options import OutputOptions, seconds_to_ns
+
+    first = run.runs[0].path
+    stem = first.resolve().name if first.is_dir() else first.name.partition(".")[0] or first.name
+    path = options.output or Path(f"{stem}.merged.mcap")
+    if path.suffix != ".mcap":
+        raise UsageError(f"--output {path}: expected a name that ends in .mcap")
+    return OutputOptions(
+        mcap=path,
+        rrd=not options.no_rrd,
+        every_ns=seconds_to_ns(options.every),
+        copy_maps=options.copy_maps,
+        force=options.force,
+    )
+
+
+def _refuse_outputs(outputs: OutputOptions, run: RunOptions) -> None:
+    """Refuse outputs that exist, that are inputs, or that have no folder."""
+    from replay.sinks import output_paths
+
+    paths = output_paths(outputs).values()
+    inputs = {item.path.resolve() for item in run.runs}
+    for path in paths:
+        if path.resolve() in inputs:
+            raise UsageError(f"{path} is an input; give another name with --output")
+    existing = [str(path) for path in paths if path.exists()]
+    if existing and not outputs.force:
+        raise UsageError(f"{', '.join(existing)} exists already; give --force to replace it, or another --output")
+    if not outputs.mcap.absolute().parent.is_dir():
+        raise OutputError(f"{outputs.mcap.absolute().parent}: there is no such folder; make it, or choose another")
+
+
+def _merge(options: argparse.Namespace) -> int:
+    run = _run_options(options)
+    outputs = _output_options(options, run)
+    _refuse_outputs(outputs, run)
+
+    from replay.pipeline import drain, merge
+    from replay.sinks import open_sinks, output_paths
+    from replay.sinks.json_file import report_text
+    from replay.sinks.terminal import Narrator, ProgressSink, open_console, print_table
+
+    notes = open_console(stderr=True)
+    narrator = Narrator(notes, announce=run.robots is None)
+    with open_sinks(outputs, extra=(ProgressSink(notes), narrator)) as sinks:
+        report = drain(merge(run), sinks).report
+    if options.json:
+        sys.stdout.write(report_text(report))
+    else:
+        print_table(open_console(), report)
+    narrator.sum_up(report, [str(path) for path in output_paths(outputs).values()])
+    return EXIT_NOT_ALL_MERGED if options.require_all and not _all_merged(report) else EXIT_DONE
+
+
+def _all_merged(report: Report) -> bool:
+    return all(robot["status"] in ("reference", "merged") for robot in report["robots"].values())
+
+
+def _info(options: argparse.Namespace) -> int:
+    from replay.info import lines, summarise
+
+    summary = summarise(_run_options(options))
+    for line in lines(summary):
+        print(line)
+    return EXIT_DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())

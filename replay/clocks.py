@@ -1,0 +1,133 @@
+"""Which clock each robot's times come from, and how the clocks of several recordings are brought together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from replay.codec import decode
+from replay.errors import BadMessage, UsageError
+from replay.events import Clock
+from replay.messages import GridMessage, UpdateMessage
+from replay.options import NS_PER_S, ClockChoice
+from replay.selection import Selected
+from replay.sources.base import RawMessage, Source
+
+_MAX_GAP_NS = 86_400 * NS_PER_S
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """What the first usable message of a robot in one input says.
+
+    Parameters
+    ----------
+    clock
+        What its times are taken from.
+    first_ns, last_ns
+        About when the robot's maps begin and end, by that clock; None for saved maps, which have no clock.
+    frame_id
+        Its map frame as recorded.
+    """
+
+    robot: str
+    input: int
+    clock: Clock
+    first_ns: int | None
+    last_ns: int | None
+    frame_id: str
+
+
+def probe(source: Source, index: int, selected: Selected, choice: ClockChoice) -> Probe | None:
+    """Read the first usable message of a robot; None if there is none."""
+    info = source.info
+    for raw in source.messages(selected.topics):
+        try:
+            message = decode(raw)
+        except BadMessage:
+            continue
+        if info.start_ns is None or info.stop_ns is None:
+            return Probe(selected.robot, index, "none", None, None, message.frame_id)
+        clock: Clock = "header" if choice == "header" and message.stamp_ns > 0 else "log"
+        first_ns = stamp_ns(clock, raw, message)
+        last_ns = first_ns + max(0, info.stop_ns - raw.log_time_ns)
+        return Probe(selected.robot, index, clock, first_ns, last_ns, message.frame_id)
+    return None
+
+
+def stamp_ns(clock: Clock, raw: RawMessage, message: GridMessage | UpdateMessage) -> int:
+    """Return the time of a message by this clock."""
+    return message.stamp_ns if clock == "header" else raw.log_time_ns
+
+
+def clock_of(probes: Sequence[Probe]) -> Clock:
+    """Return one robot's clock: the header's only if all of its inputs have it."""
+    clocks = [probe.clock for probe in probes if probe.clock != "none"]
+    if not clocks:
+        return "none" if probes else "header"
+    return "header" if all(clock == "header" for clock in clocks) else "log"
+
+
+def frames(robots: Sequence[str], frame_ids: Mapping[str, str], merged_frame: str) -> dict[str, str]:
+    """Return each robot's map frame for the outputs.
+
+    It is the recorded one, its leading slash stripped, where that is unique in the run; else the robot's name and
+    the frame, as ``r1/map``.
+    """
+    bare = {robot: frame_ids.get(robot, "").strip("/") or "map" for robot in robots}
+    taken = list(bare.values())
+    return {
+        robot: frame
+        if taken.count(frame) == 1 and frame_ids.get(robot) and frame != merged_frame
+        else f"{robot}/{frame}"
+        for robot, frame in bare.items()
+    }
+
+
+def offsets_ns(reference: str, probes: Sequence[Probe], *, align_starts: bool) -> dict[tuple[int, str], int]:
+    """Return what is added to the times of each input and robot, to have them on the reference's clock.
+
+    Raises
+    ------
+    UsageError
+        If a robot's times are more than a day away from the reference's, and starts are not to be aligned.
+    """
+    timed = [item for item in probes if item.first_ns is not None]
+    own = [item for item in timed if item.robot == reference]
+    anchor = own[0] if own else (timed[0] if timed else None)
+    if anchor is None:
+        return {}
+    if not align_starts:
+        for item in timed:
+            _refuse_other_clock(anchor, item)
+        return {(item.input, item.robot): 0 for item in timed}
+    groups: dict[tuple[int, Clock], list[Probe]] = {}
+    for item in timed:
+        groups.setdefault((item.input, item.clock), []).append(item)
+    start_ns = _first_ns(groups[anchor.input, anchor.clock])
+    return {(item.input, item.robot): start_ns - _first_ns(group) for group in groups.values() for item in group}
+
+
+def _first_ns(group: Sequence[Probe]) -> int:
+    return min(item.first_ns for item in group if item.first_ns is not None)
+
+
+def _refuse_other_clock(anchor: Probe, item: Probe) -> None:
+    if anchor.first_ns is None or anchor.last_ns is None or item.first_ns is None or item.last_ns is None:
+        return
+    gap_ns = max(anchor.first_ns - item.last_ns, item.first_ns - anchor.last_ns)
+    if gap_ns > _MAX_GAP_NS:
+        raise UsageError(
+            f"the clocks of {anchor.robot} ({_date(anchor.first_ns)}) and {item.robot} ({_date(item.first_ns)}) are "
+            f"{gap_ns / _MAX_GAP_NS:.0f} days apart and cannot be the same; give --align-starts to let both begin "
+            "at the same time"
+        )
+
+
+def _date(time_ns: int) -> str:
+    try:
+        moment = datetime.fromtimestamp(time_ns // NS_PER_S, tz=UTC)
+    except (OverflowError, ValueError, OSError):
+        return f"{time_ns} ns"
+    return moment.strftime("%Y-%m-%d %H:%M:%S")

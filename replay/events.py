@@ -1,0 +1,136 @@
+"""What happens in a run, in order. Everything that is shown or written is a sink of these events."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Literal
+
+from mapmerge.merger import MergeResult
+from mapmerge.render import Picture
+
+Report = Mapping[str, Any]
+Clock = Literal["header", "log", "none"]
+
+
+class SkipCause(StrEnum):
+    """Why a message was not used: a closed list."""
+
+    UNDECODABLE = "undecodable"
+    """Its bytes are not those of its type."""
+    SIZE_MISMATCH = "size_mismatch"
+    """Its data does not have width × height cells."""
+    BAD_RESOLUTION = "bad_resolution"
+    """Its resolution is zero, negative or not a number."""
+    BAD_ORIGIN = "bad_origin"
+    """Its origin is not finite, or not a pose in the plane."""
+    TOO_LARGE = "too_large"
+    """A side has more than 100 000 cells."""
+    EMPTY = "empty"
+    """It has no cells."""
+    UPDATE_BEFORE_GRID = "update_before_grid"
+    """An update of a part, before any full map."""
+    UPDATE_OUTSIDE_GRID = "update_outside_grid"
+    """An update of a part that is not within the last full map."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotInput:
+    """Where one robot's maps come from.
+
+    Parameters
+    ----------
+    robot
+        Its name.
+    topic
+        Its map topic.
+    frame
+        Its map frame in all outputs.
+    clock
+        What its times are taken from; ``none`` for saved maps.
+    inputs
+        Which of the run's inputs hold it, as indices.
+    message_count
+        Messages of its topics.
+    """
+
+    robot: str
+    topic: str
+    frame: str
+    clock: Clock
+    inputs: tuple[int, ...]
+    message_count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Started:
+    """The run was understood and begins; the first robot is the reference."""
+
+    robots: tuple[RobotInput, ...]
+    settings: Mapping[str, Any]
+    inputs: tuple[Mapping[str, Any], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Skipped:
+    """A message could not be used."""
+
+    robot: str
+    topic: str
+    log_time_ns: int
+    cause: SkipCause
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Seconds of wall time that one tick took; for people to look at, never part of a result."""
+
+    merge_s: float
+    render_s: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotPicture:
+    """A picture of one step of the method for one robot."""
+
+    robot: str
+    picture: Picture
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Merged:
+    """Messages with maps arrived at this time and were taken in.
+
+    Parameters
+    ----------
+    stamp_ns
+        Time of the tick, on the reference's clock; never decreases.
+    result
+        All that the merger knows now.
+    report
+        The report as of now, in the form that is written.
+    pictures
+        Intermediate images that are due, rendered once for all sinks.
+    done, total
+        Messages read so far, and in all.
+    """
+
+    stamp_ns: int
+    result: MergeResult
+    report: Report
+    pictures: tuple[RobotPicture, ...]
+    timing: Timing
+    done: int
+    total: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Finished:
+    """All was read; ``report`` is the final one."""
+
+    report: Report
+
+
+Event = Started | Skipped | Merged | Finished

@@ -1,0 +1,168 @@
+"""What recordings hold, and what would be merged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from replay.codec import decode
+from replay.errors import BadMessage, ReplayError
+from replay.messages import GridMessage
+from replay.options import RunOptions
+from replay.plan import open_plan
+from replay.sources import open_source
+from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
+
+
+@dataclass(frozen=True, slots=True)
+class TopicSummary:
+    """One topic with maps, or with updates of maps.
+
+    Parameters
+    ----------
+    messages, unusable
+        All messages, and those that are no valid map.
+    sizes
+        Columns and rows of the first and of the last map, where they differ.
+    resolutions_m
+        All resolutions, ascending.
+    frames
+        Frames as recorded, in order of first use.
+    header_times
+        Whether the messages carry a time of their own.
+    """
+
+    name: str
+    msgtype: str
+    messages: int
+    unusable: int
+    sizes: tuple[tuple[int, int], ...]
+    resolutions_m: tuple[float, ...]
+    frames: tuple[str, ...]
+    header_times: bool
+
+
+@dataclass(frozen=True, slots=True)
+class InputSummary:
+    """One recording; ``duration_s`` is None where it has no clock."""
+
+    path: Path
+    format: str
+    duration_s: float | None
+    messages: int
+    topics: tuple[TopicSummary, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RunSummary:
+    """All recordings, and what would be merged.
+
+    Parameters
+    ----------
+    robots
+        Robot and topic, the reference first; empty if nothing would be merged.
+    problem
+        Why nothing would be merged; None if something would.
+    """
+
+    inputs: tuple[InputSummary, ...]
+    robots: tuple[tuple[str, str], ...]
+    problem: str | None
+
+
+def summarise(options: RunOptions) -> RunSummary:
+    """Read what the recordings hold.
+
+    Raises
+    ------
+    ReplayError
+        If a recording cannot be read.
+    """
+    with ExitStack() as stack:
+        sources = [stack.enter_context(open_source(run.path)) for run in options.runs]
+        inputs = tuple(_input(source) for source in sources)
+    try:
+        with open_plan(options) as plan:
+            return RunSummary(inputs, tuple((item.robot, item.topic) for item in plan.robots), None)
+    except ReplayError as error:
+        return RunSummary(inputs, (), str(error))
+
+
+def _input(source: Source) -> InputSummary:
+    info = source.info
+    return InputSummary(
+        path=source.path,
+        format=info.format,
+        duration_s=_duration_s(info),
+        messages=sum(topic.message_count for topic in info.topics),
+        topics=tuple(_topic(source, topic.name) for topic in info.topics if topic.msgtype in (GRID_TYPE, UPDATE_TYPE)),
+    )
+
+
+def _duration_s(info: SourceInfo) -> float | None:
+    if info.start_ns is None or info.stop_ns is None:
+        return None
+    return (info.stop_ns - info.start_ns) / 1e9
+
+
+def _topic(source: Source, name: str) -> TopicSummary:
+    topic = next(item for item in source.info.topics if item.name == name)
+    sizes: list[tuple[int, int]] = []
+    resolutions: set[float] = set()
+    frames: dict[str, None] = {}
+    unusable, stamped = 0, False
+    for raw in source.messages([name]):
+        try:
+            message = decode(raw)
+        except BadMessage:
+            unusable += 1
+            continue
+        frames.setdefault(message.frame_id)
+        stamped = stamped or message.stamp_ns > 0
+        if isinstance(message, GridMessage):
+            sizes.append((message.grid.cols, message.grid.rows))
+            resolutions.add(message.grid.resolution_m)
+    return TopicSummary(
+        name=name,
+        msgtype=topic.msgtype,
+        messages=topic.message_count,
+        unusable=unusable,
+        sizes=tuple(dict.fromkeys((sizes[0], sizes[-1]))) if sizes else (),
+        resolutions_m=tuple(sorted(resolutions)),
+        frames=tuple(frames),
+        header_times=stamped,
+    )
+
+
+def lines(summary: RunSummary) -> Iterator[str]:
+    """Yield the summary as lines to read."""
+    for item in summary.inputs:
+        duration = f"{item.duration_s:.1f} s" if item.duration_s is not None else "no clock"
+        yield f"{item.path}: {item.format}, {duration}, {item.messages} messages"
+        yield from _columns([_row(topic) for topic in item.topics])
+    if summary.problem is not None:
+        yield f"nothing would be merged: {summary.problem}"
+        return
+    reference, *others = (f"{robot} ({topic})" for robot, topic in summary.robots)
+    yield f"would be merged: {', '.join(others) or 'nothing else'} into {reference}, the reference"
+
+
+def _row(topic: TopicSummary) -> tuple[str, ...]:
+    sizes = " → ".join(f"{cols} × {rows}" for cols, rows in topic.sizes)
+    return (
+        topic.name,
+        topic.msgtype,
+        f"{topic.messages} messages" + (f" ({topic.unusable} unusable)" if topic.unusable else ""),
+        sizes,
+        ", ".join(f"{resolution:g} m" for resolution in topic.resolutions_m),
+        f"frame {', '.join(topic.frames)}" if any(topic.frames) else "no frame",
+        "header times" if topic.header_times else "log times only",
+    )
+
+
+def _columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()

@@ -1,0 +1,148 @@
+"""What a run can be told, as values; the command line and Python build the same ones."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from decimal import Decimal
+from pathlib import Path
+from typing import Any, Literal
+
+from mapmerge.config import MergeConfig
+from replay.errors import UsageError
+from replay.selection import RunPath, TopicChoice
+
+NS_PER_S = 1_000_000_000
+DEFAULT_REORDER_WINDOW_NS = 5 * NS_PER_S
+
+ImageChoice = Literal["none", "changed", "all"]
+ClockChoice = Literal["header", "log"]
+
+
+def seconds_to_ns(text: str) -> int:
+    """Read a number of seconds, not negative, as whole nanoseconds.
+
+    Raises
+    ------
+    UsageError
+        If it is none.
+    """
+    if not re.fullmatch(r"\d+(\.\d*)?|\.\d+", text):
+        raise UsageError(f"{text!r} is no number of seconds; expected one such as 12.5")
+    return int(Decimal(text) * NS_PER_S)
+
+
+@dataclass(frozen=True, slots=True)
+class TimeBound:
+    """``--start`` or ``--stop``: after the run's first map, or absolute."""
+
+    ns: int
+    relative: bool
+
+    @staticmethod
+    def parse(text: str) -> TimeBound:
+        """Read ``12.5`` (seconds after the first map), ``1700000000000000000ns`` or an ISO 8601 time."""
+        if re.fullmatch(r"\d+ns", text):
+            return TimeBound(int(text[:-2]), relative=False)
+        if re.fullmatch(r"[\d.]+", text):
+            return TimeBound(seconds_to_ns(text), relative=True)
+        try:
+            moment = datetime.fromisoformat(text)
+        except ValueError:
+            raise UsageError(
+                f"{text!r} is no time; expected seconds after the first map such as 12.5, nanoseconds since 1970 "
+                "such as 1700000000000000000ns, or ISO 8601 such as 2026-05-01T12:00:00Z"
+            ) from None
+        since = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
+        return TimeBound((since.days * 86_400 + since.seconds) * NS_PER_S + since.microseconds * 1_000, relative=False)
+
+    def absolute_ns(self, start_ns: int) -> int:
+        """Return the time on the run's clock, whose first map is at ``start_ns``."""
+        return start_ns + self.ns if self.relative else self.ns
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """What is read and how it is merged: all that affects the result.
+
+    Parameters
+    ----------
+    runs
+        The recordings.
+    robots
+        Robots to merge, the reference first; None for all.
+    topics
+        Map topics said outright.
+    clock
+        What times are taken from, where the messages have it.
+    start, stop
+        Only maps from ``start`` on and before ``stop`` are used.
+    reorder_window_ns
+        Messages are put in order of time within this window.
+    align_starts
+        Shift clocks that cannot be the same so that the robots start together.
+    strict
+        Whether a message that cannot be used ends the run.
+    images
+        Which intermediate images are rendered.
+    merge
+        Settings of the merger.
+    """
+
+    runs: tuple[RunPath, ...]
+    robots: tuple[str, ...] | None = None
+    topics: tuple[TopicChoice, ...] = ()
+    clock: ClockChoice = "header"
+    start: TimeBound | None = None
+    stop: TimeBound | None = None
+    reorder_window_ns: int = DEFAULT_REORDER_WINDOW_NS
+    align_starts: bool = False
+    strict: bool = False
+    images: ImageChoice = "changed"
+    merge: MergeConfig = field(default_factory=MergeConfig)
+
+    def settings(self) -> Mapping[str, Any]:
+        """Return the settings that affect results, as written to reports."""
+        return {
+            "clock": self.clock,
+            "start": asdict(self.start) if self.start else None,
+            "stop": asdict(self.stop) if self.stop else None,
+            "reorder_window_ns": self.reorder_window_ns,
+            "align_starts": self.align_starts,
+            "topics": [asdict(choice) for choice in self.topics],
+            "merge": _plain(asdict(self.merge)),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class OutputOptions:
+    """What is written.
+
+    Parameters
+    ----------
+    mcap
+        The new MCAP; the recording and the report stand beside it.
+    rrd
+        Whether the Rerun recording is written.
+    every_ns
+        Least time between two merged maps in the MCAP.
+    copy_maps
+        Whether the robots' own maps are copied to the MCAP.
+    force
+        Whether files that exist are replaced.
+    """
+
+    mcap: Path
+    rrd: bool = True
+    every_ns: int = 0
+    copy_maps: bool = False
+    force: bool = False
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 - any JSON value
+    """Return the value with tuples as lists, as JSON has them."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value

@@ -1,0 +1,66 @@
+"""The one pipeline: recordings → ticks → the merger's step → events → sinks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from time import perf_counter
+
+from mapmerge.merger import MergeState, step
+from replay import __version__
+from replay.events import Event, Finished, Merged, Skipped, Started, Timing
+from replay.gallery import Gallery
+from replay.options import RunOptions
+from replay.plan import Plan, open_plan
+from replay.report import ReportBuilder
+from replay.sinks.base import Sink
+from replay.timeline import Tally, ticks
+
+
+def run(plan: Plan, options: RunOptions) -> Iterator[Event]:
+    """Replay what was planned and yield what happens."""
+    settings = options.settings()
+    report = ReportBuilder(plan.robots, settings, __version__)
+    gallery = Gallery(options.images)
+    tallies = tuple(Tally() for _ in plan.feeds)
+    inputs = plan.describe_inputs()
+    state = MergeState.initial([item.robot for item in plan.robots])
+    done, total, stamp_ns = 0, sum(item.message_count for item in plan.robots), None
+
+    yield Started(plan.robots, settings, inputs)
+    for tick in ticks(plan.feeds, tallies, plan.window, strict=options.strict):
+        if isinstance(tick, Skipped):
+            report.skip(tick)
+            yield tick
+            continue
+        begin = perf_counter()
+        state, result = step(state, tick.grids, options.merge)
+        merged = perf_counter()
+        pictures = gallery.due(result)
+        timing = Timing(merged - begin, perf_counter() - merged)
+        report.take(tick.stamp_ns, result)
+        done, stamp_ns = done + tick.messages, tick.stamp_ns
+        yield Merged(stamp_ns, result, report.build(stamp_ns, result, inputs), pictures, timing, done, total)
+    yield Finished(report.build(stamp_ns, state.result, plan.describe_inputs(tallies)))
+
+
+def merge(options: RunOptions) -> Iterator[Event]:
+    """Open a run's inputs, merge them, and yield what happens.
+
+    Raises
+    ------
+    ReplayError
+        If an input cannot be read, or the robots that were asked for are not there.
+    """
+    with open_plan(options) as plan:
+        yield from run(plan, options)
+
+
+def drain(events: Iterable[Event], sinks: Iterable[Sink]) -> Finished:
+    """Give each event to each sink, and return the last event."""
+    targets = tuple(sinks)
+    for event in events:
+        for sink in targets:
+            sink.take(event)
+        if isinstance(event, Finished):
+            return event
+    raise AssertionError("a run ends with Finished")

@@ -1,0 +1,144 @@
+"""The report: what became of each robot's map and why, as plain JSON values.
+
+Numbers are rounded to micrometres and microradians, far below what any map can tell, so that reports read well.
+What is absent is None. Nothing in a report depends on the machine or on the time of day.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from mapmerge.fuse import Agreement
+from mapmerge.match import Match
+from mapmerge.merger import ChangeKind, MergeResult, Pair, RobotOutcome
+from mapmerge.reasons import Reason
+from mapmerge.sim2 import Sim2, wrap_angle
+from replay.events import Report, RobotInput, Skipped
+
+SCHEMA = "replay.report/1"
+_DIGITS = 6
+
+Json = dict[str, Any]
+
+
+class ReportBuilder:
+    """Folds a run into its report.
+
+    Parameters
+    ----------
+    robots
+        The run's robots, the reference first.
+    settings
+        Settings that affect results.
+    version
+        Of this program.
+    """
+
+    def __init__(self, robots: Sequence[RobotInput], settings: Mapping[str, Any], version: str) -> None:
+        self._robots = robots
+        self._settings = settings
+        self._version = version
+        self._updates: Counter[str] = Counter()
+        self._skipped: Counter[str] = Counter()
+        self._first_merged_ns: dict[str, int] = {}
+        self._history: list[Json] = []
+
+    def skip(self, event: Skipped) -> None:
+        """Count a message that was not used."""
+        self._skipped[event.cause] += 1
+
+    def take(self, stamp_ns: int, result: MergeResult) -> None:
+        """Take in what a tick brought."""
+        self._updates.update(result.updated)
+        for change in result.changes:
+            if change.kind is ChangeKind.PLACED:
+                self._first_merged_ns.setdefault(change.robot, stamp_ns)
+            self._history.append(
+                {
+                    "stamp_ns": stamp_ns,
+                    "robot": change.robot,
+                    "event": str(change.kind),
+                    "reason": _reason(change.reason),
+                }
+            )
+
+    def build(self, stamp_ns: int | None, result: MergeResult, inputs: Sequence[Mapping[str, Any]]) -> Report:
+        """Return the report as of now."""
+        return {
+            "schema": SCHEMA,
+            "version": self._version,
+            "stamp_ns": stamp_ns,
+            "reference": self._robots[0].robot,
+            "robots": {item.robot: self._robot(item, result.robots[item.robot]) for item in self._robots},
+            "pairs": [_pair(pair, match) for pair, match in result.pairs.items()],
+            "history": list(self._history),
+            "updates": self._updates.total(),
+            "skipped": dict(sorted(self._skipped.items())),
+            "inputs": [dict(item) for item in inputs],
+            "settings": dict(self._settings),
+        }
+
+    def _robot(self, item: RobotInput, outcome: RobotOutcome) -> Json:
+        placement = outcome.placement
+        return {
+            "status": str(outcome.status),
+            "reason": _reason(outcome.reason),
+            "merged_from_map": _pose(outcome.merged_from_map),
+            **_agreement(outcome.agreement),
+            "confidence": None,
+            "component": placement.component if placement else None,
+            "component_from_map": _pose(placement.component_from_map) if placement else None,
+            "placed_via": placement.via if placement else None,
+            "map_frame": item.frame,
+            "map_topic": item.topic,
+            "first_merged_stamp_ns": self._first_merged_ns.get(item.robot),
+            "updates": self._updates[item.robot],
+        }
+
+
+def _reason(reason: Reason) -> Json:
+    return {"code": str(reason.code), "message": reason.message}
+
+
+def _pose(pose: Sim2 | None) -> Json | None:
+    if pose is None:
+        return None
+    return {
+        "x_m": _round(pose.x_m),
+        "y_m": _round(pose.y_m),
+        "yaw_rad": _round(wrap_angle(pose.yaw_rad)),
+        "scale": _round(pose.scale),
+    }
+
+
+def _agreement(agreement: Agreement | None) -> Json:
+    if agreement is None:
+        return {"acceptance": None, "overlap_m2": None, "overlap_fraction": None}
+    return {
+        "acceptance": _round(agreement.acceptance) if agreement.overlap_m2 > 0 else None,
+        "overlap_m2": _round(agreement.overlap_m2),
+        "overlap_fraction": _round(agreement.overlap_fraction),
+    }
+
+
+def _pair(pair: Pair, match: Match) -> Json:
+    scores = match.scores
+    return {
+        "a": pair[0],
+        "b": pair[1],
+        "a_from_b": _pose(match.target_from_source),
+        "scores": {name: _round(value) for name, value in asdict(scores).items()} if scores else None,
+        "accepted": match.accepted,
+        "reason": _reason(match.reason),
+        "rivals": [
+            {"a_from_b": _pose(rival.target_from_source), "score_m": _round(rival.score_m)} for rival in match.rivals
+        ],
+    }
+
+
+def _round(value: float) -> float:
+    """Round, and turn −0.0 into 0.0 so that equal values are written alike."""
+    return round(value, _DIGITS) + 0.0

@@ -1,0 +1,238 @@
+"""Which topic of which input is which robot's map."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from replay.errors import InputError, UsageError
+from replay.sources.base import GRID_TYPE, UPDATE_TYPE, SourceInfo
+
+_NOT_A_MAP = re.compile(r"costmap|mask|keepout|speed", re.IGNORECASE)
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
+
+
+@dataclass(frozen=True, slots=True)
+class RunPath:
+    """One ``RUN`` argument: a path, and the robot that it is of where that was said."""
+
+    robot: str | None
+    path: Path
+
+    @staticmethod
+    def parse(text: str) -> RunPath:
+        """Read ``PATH`` or ``ROBOT=PATH``; a path that exists is a path even if it has an equals sign."""
+        name, sign, rest = text.partition("=")
+        if sign and rest and _NAME.fullmatch(name) and not Path(text).exists():
+            return RunPath(name, Path(rest))
+        return RunPath(None, Path(text))
+
+
+@dataclass(frozen=True, slots=True)
+class TopicChoice:
+    """``--topic``: for one robot, or for all with ``{robot}`` in its place."""
+
+    robot: str | None
+    topic: str
+
+    @staticmethod
+    def parse(text: str) -> TopicChoice:
+        """Read ``/{robot}/map`` or ``r1=/x``."""
+        name, sign, rest = text.partition("=")
+        return TopicChoice(name, rest) if sign else TopicChoice(None, text)
+
+
+@dataclass(frozen=True, slots=True)
+class Selected:
+    """One robot's map topic, and the inputs (as indices) that hold it."""
+
+    robot: str
+    topic: str
+    inputs: tuple[int, ...]
+
+    @property
+    def topics(self) -> tuple[str, str]:
+        """The map's topic and that of the updates of parts of it."""
+        return self.topic, f"{self.topic}_updates"
+
+
+def select(
+    runs: Sequence[RunPath],
+    infos: Sequence[SourceInfo],
+    *,
+    robots: Sequence[str] | None = None,
+    topics: Sequence[TopicChoice] = (),
+) -> tuple[Selected, ...]:
+    """Find each robot's map topic; the first robot is the reference.
+
+    Parameters
+    ----------
+    runs, infos
+        The inputs, and what each holds.
+    robots
+        Names asked for, the reference first; None for all that are found.
+    topics
+        Topics said outright.
+
+    Raises
+    ------
+    InputError
+        If there is no map at all.
+    UsageError
+        If a robot is not there or its topic is ambiguous; the text lists what is there, as flags to paste.
+    """
+    if not any(_grid_topics(info) for info in infos):
+        raise InputError(_nothing(runs, infos))
+    found = _discovered(runs, infos, topics)
+    wanted = list(robots) if robots is not None else _all_names(runs, found)
+    selected = []
+    for robot in wanted:
+        candidates = found.get(robot) or _by_component(robot, runs, infos, topics)
+        selected.append(_one(robot, candidates, found))
+    _refuse_shared(selected)
+    return tuple(selected)
+
+
+Candidates = dict[str, tuple[int, ...]]
+
+
+def _grid_topics(info: SourceInfo) -> list[str]:
+    return sorted(topic.name for topic in info.topics if topic.msgtype == GRID_TYPE and topic.message_count > 0)
+
+
+def _discovered(
+    runs: Sequence[RunPath], infos: Sequence[SourceInfo], topics: Sequence[TopicChoice]
+) -> dict[str, Candidates]:
+    """Return for each robot that can be named the map topics that may be its own."""
+    found: dict[str, Candidates] = {}
+    for index, (run, info) in enumerate(zip(runs, infos, strict=True)):
+        names = _names_in(run, _grid_topics(info))
+        for topic, robot in names.items():
+            if _chosen(robot, topic, topics):
+                candidates = found.setdefault(robot, {})
+                candidates[topic] = (*candidates.get(topic, ()), index)
+    for choice in topics:
+        if choice.robot is not None:
+            found[choice.robot] = _said_outright(choice, runs, infos)
+    return {robot: _best(robot, candidates) for robot, candidates in found.items()}
+
+
+def _names_in(run: RunPath, topics: Sequence[str]) -> dict[str, str]:
+    """Return the robot of each map topic of one input."""
+    if run.robot is not None:
+        return dict.fromkeys(topics, run.robot)
+    named = [topic for topic in topics if _namespace(topic)]
+    if any(not _NOT_A_MAP.search(topic) for topic in named):
+        return _named_by_namespace(named)
+    bare = [topic for topic in topics if not _namespace(topic)]
+    return dict.fromkeys(bare, _stem(run.path)) if bare else _named_by_namespace(named)
+
+
+def _named_by_namespace(topics: Sequence[str]) -> dict[str, str]:
+    """Name robots by the first part of the namespace or, where that is shared by several robots, by the last."""
+    maps = [topic for topic in topics if not _NOT_A_MAP.search(topic)] or list(topics)
+    names = {}
+    for topic in maps:
+        first = _namespace(topic)[0]
+        alike = {other: _namespace(other) for other in maps if _namespace(other)[0] == first}
+        fleet = f"/{first}/map" not in alike and len({space[-1] for space in alike.values()}) == len(alike) > 1
+        names[topic] = _namespace(topic)[-1] if fleet else first
+    return names
+
+
+def _namespace(topic: str) -> list[str]:
+    return [part for part in topic.split("/") if part][:-1]
+
+
+def _stem(path: Path) -> str:
+    name = path.resolve().name.removesuffix(".zstd")
+    return re.sub(r"[^A-Za-z0-9_.-]", "_", name.partition(".")[0] or name)
+
+
+def _chosen(robot: str, topic: str, topics: Sequence[TopicChoice]) -> bool:
+    patterns = [choice.topic.replace("{robot}", robot) for choice in topics if choice.robot is None]
+    return not patterns or topic in patterns
+
+
+def _said_outright(choice: TopicChoice, runs: Sequence[RunPath], infos: Sequence[SourceInfo]) -> Candidates:
+    own = [index for index, run in enumerate(runs) if run.robot == choice.robot]
+    holders = own or [index for index, run in enumerate(runs) if run.robot is None]
+    inputs = tuple(index for index in holders if choice.topic in _grid_topics(infos[index]))
+    if not inputs:
+        there = _flags({topic: str(choice.robot) for index in holders for topic in _grid_topics(infos[index])})
+        raise UsageError(f"--topic {choice.robot}={choice.topic}: no map on this topic; there are: {there}")
+    return {choice.topic: inputs}
+
+
+def _by_component(
+    robot: str, runs: Sequence[RunPath], infos: Sequence[SourceInfo], topics: Sequence[TopicChoice]
+) -> Candidates:
+    """Return the map topics with the robot's name anywhere in their namespace."""
+    found: Candidates = {}
+    for index, (run, info) in enumerate(zip(runs, infos, strict=True)):
+        for topic in _grid_topics(info):
+            inside = robot in _namespace(topic) or "/".join(_namespace(topic)) == robot.strip("/")
+            patterned = any(choice.robot is None for choice in topics) and _chosen(robot, topic, topics)
+            if run.robot is None and (patterned or (inside and _chosen(robot, topic, topics))):
+                found[topic] = (*found.get(topic, ()), index)
+    return _best(robot, found)
+
+
+def _best(robot: str, candidates: Candidates) -> Candidates:
+    """Keep what is most like a robot's map: ``/robot/map``, then ``…/map``, then any map, then costmaps and masks."""
+
+    def rank(topic: str) -> int:
+        if _NOT_A_MAP.search(topic):
+            return 3
+        if topic == f"/{robot}/map":
+            return 0
+        return 1 if topic.rsplit("/", 1)[-1] == "map" else 2
+
+    best = min(map(rank, candidates), default=0)
+    return {topic: inputs for topic, inputs in candidates.items() if rank(topic) == best}
+
+
+def _all_names(runs: Sequence[RunPath], found: Mapping[str, Candidates]) -> list[str]:
+    """Return all robots: those named with their paths in that order, then the others by name."""
+    given = list(dict.fromkeys(run.robot for run in runs if run.robot is not None))
+    return [*given, *sorted(set(found) - set(given))]
+
+
+def _one(robot: str, candidates: Candidates, found: Mapping[str, Candidates]) -> Selected:
+    if not candidates:
+        there = _flags({topic: name for name in sorted(found) for topic in found[name]}) or "none"
+        raise UsageError(f"there is no map of robot {robot!r}; there are: {there}")
+    if len(candidates) > 1:
+        choices = _flags(dict.fromkeys(candidates, robot))
+        raise UsageError(f"robot {robot!r} has {len(candidates)} map topics; choose one of: {choices}")
+    topic, inputs = next(iter(candidates.items()))
+    return Selected(robot, topic, inputs)
+
+
+def _refuse_shared(selected: Sequence[Selected]) -> None:
+    """Refuse two robots that would be fed from the same topic of the same input."""
+    owners: dict[tuple[int, str], str] = {}
+    for item in selected:
+        for index in item.inputs:
+            other = owners.setdefault((index, item.topic), item.robot)
+            if other != item.robot:
+                raise UsageError(
+                    f"robots {other!r} and {item.robot!r} would both be fed from {item.topic}; "
+                    f"give each its own, as --topic {item.robot}=/its/topic"
+                )
+
+
+def _flags(robots: Mapping[str, str]) -> str:
+    return "  ".join(f"--topic {robot}={topic}" for topic, robot in sorted(robots.items(), key=lambda item: item[::-1]))
+
+
+def _nothing(runs: Sequence[RunPath], infos: Sequence[SourceInfo]) -> str:
+    paths = ", ".join(str(run.path) for run in runs)
+    types = sorted({topic.msgtype for info in infos for topic in info.topics if topic.message_count > 0})
+    if UPDATE_TYPE in types:
+        what = "only updates of parts of maps, no full map"
+    else:
+        what = f"no map, only {', '.join(types)}" if types else "no messages"
+    return f"{paths}: {what}; expected a topic of type {GRID_TYPE}, such as /r1/map"

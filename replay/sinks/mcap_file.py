@@ -1,0 +1,213 @@
+"""The merged map, transforms, report and images as a new MCAP, ROS 2 profile.
+
+Bytes are the same for the same input and settings: times are those of the recording, and nothing of the machine or
+of the time of day is written.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from mcap.exceptions import McapError
+from mcap.writer import CompressionType, Writer
+
+from mapmerge.grid import Grid
+from mapmerge.merger import MergeResult
+from replay import __version__
+from replay.codec import encode_grid, ros2_message_definition
+from replay.events import Event, Finished, Merged, Report, RobotInput, RobotPicture, Started
+from replay.options import OutputOptions
+from replay.plan import MERGED_FRAME
+from replay.sinks.partial_file import PartialFile, output_errors
+from replay.sinks.qos import LATCHED, VOLATILE
+from replay.sinks.ros2_messages import IMAGE_TYPE, TF_TYPE, FrameTransform, encode_image, encode_transforms
+from replay.sources.base import GRID_TYPE
+
+MAP_TOPIC = "/merged/map"
+REPORT_TOPIC = "/merged/report"
+IMAGE_TOPICS = "/merged/images"
+REPORT_SCHEMA = "replay.report"
+
+_CHUNK_BYTES = 4 << 20
+
+
+class McapSink:
+    """Writes a run's outcome to an MCAP that mcap, rosbags, Rerun and Foxglove read."""
+
+    def __init__(self, path: Path, options: OutputOptions) -> None:
+        self._options = options
+        self._file = PartialFile(path)
+        self._robots: tuple[RobotInput, ...] = ()
+        self._merged: Grid | None = None
+        self._last_map_ns: int | None = None
+        self._pending_map: tuple[int, Grid] | None = None
+        self._pending_report: tuple[int, Report] | None = None
+        with output_errors(path):
+            self._stream = self._file.partial.open("wb")
+        self._channels = _Channels(Writer(self._stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD))
+
+    def take(self, event: Event) -> None:
+        """Write what a tick brought."""
+        with output_errors(self._file.path, McapError):
+            match event:
+                case Started():
+                    self._robots = event.robots
+                    self._channels.start(f"replay {__version__}")
+                    self._channels.metadata("replay.provenance", _provenance(event))
+                case Merged():
+                    self._tick(event)
+                case Finished():
+                    self._end(event.report)
+                case _:
+                    pass
+
+    def finish(self) -> None:
+        """Write the index and close the file."""
+        with output_errors(self._file.path, McapError):
+            self._channels.finish()
+            self._stream.close()
+
+    def publish(self) -> None:
+        """Give the file its final name."""
+        self._file.publish()
+
+    def discard(self) -> None:
+        """Remove the file."""
+        self._stream.close()
+        self._file.discard()
+
+    def _tick(self, event: Merged) -> None:
+        self._flush_report()
+        if self._options.copy_maps:
+            self._copy_maps(event.stamp_ns, event.result)
+        self._map(event.stamp_ns, event.result.merged)
+        transforms = self._transforms(event.result)
+        if transforms:
+            self._channels.ros2("/tf", TF_TYPE, event.stamp_ns, encode_transforms(transforms, event.stamp_ns))
+        for item in event.pictures:
+            self._image(item, event.stamp_ns)
+        self._pending_report = (event.stamp_ns, event.report)
+
+    def _map(self, stamp_ns: int, merged: Grid | None) -> None:
+        """Write the merged map if it changed, at once or, when the last one is too recent, later."""
+        if merged is not None and merged is not self._merged and merged.cells.size:
+            self._merged = merged
+            self._pending_map = (stamp_ns, merged)
+        due = self._last_map_ns is None or stamp_ns - self._last_map_ns >= self._options.every_ns
+        if due:
+            self._flush_map(stamp_ns)
+
+    def _flush_map(self, stamp_ns: int) -> None:
+        if self._pending_map is None:
+            return
+        _, merged = self._pending_map
+        self._pending_map, self._last_map_ns = None, stamp_ns
+        self._channels.ros2(MAP_TOPIC, GRID_TYPE, stamp_ns, encode_grid(merged, MERGED_FRAME, stamp_ns), latched=True)
+
+    def _copy_maps(self, stamp_ns: int, result: MergeResult) -> None:
+        for item in self._robots:
+            if item.robot in result.updated:
+                data = encode_grid(result.grids[item.robot], item.frame, stamp_ns)
+                self._channels.ros2(f"/{topic_part(item.robot)}/map", GRID_TYPE, stamp_ns, data, latched=True)
+
+    def _transforms(self, result: MergeResult) -> list[FrameTransform]:
+        return [
+            FrameTransform(MERGED_FRAME, item.frame, pose)
+            for item in self._robots
+            if result.merged is not None and (pose := result.robots[item.robot].merged_from_map) is not None
+        ]
+
+    def _image(self, item: RobotPicture, stamp_ns: int) -> None:
+        topic = f"{IMAGE_TOPICS}/{topic_part(item.robot)}/{item.picture.step}"
+        data = encode_image(item.picture.rgb, MERGED_FRAME, stamp_ns)
+        self._channels.ros2(topic, IMAGE_TYPE, stamp_ns, data)
+
+    def _flush_report(self) -> None:
+        """Write the report of the tick before: it is held back, for the last one is only known at the end."""
+        if self._pending_report is not None:
+            stamp_ns, report = self._pending_report
+            self._channels.report(stamp_ns, report)
+            self._pending_report = None
+
+    def _end(self, report: Report) -> None:
+        if self._pending_report is not None:
+            stamp_ns, _ = self._pending_report
+            self._flush_map(stamp_ns)
+            self._pending_report = (stamp_ns, report)
+        self._flush_report()
+        self._channels.metadata("replay.inputs", {"inputs": _compact(report["inputs"])})
+
+
+class _Channels:
+    """Registers schemas and channels on first use and writes messages to them."""
+
+    def __init__(self, writer: Writer) -> None:
+        self._writer = writer
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self._sequences: dict[str, int] = {}
+
+    def start(self, library: str) -> None:
+        self._writer.start(profile="ros2", library=library)
+
+    def finish(self) -> None:
+        self._writer.finish()  # type: ignore[no-untyped-call]
+
+    def metadata(self, name: str, values: Mapping[str, str]) -> None:
+        self._writer.add_metadata(name, dict(values))
+
+    def ros2(self, topic: str, msgtype: str, stamp_ns: int, data: bytes, *, latched: bool = False) -> None:
+        if topic not in self._channels:
+            if msgtype not in self._schemas:
+                definition = ros2_message_definition(msgtype).encode()
+                self._schemas[msgtype] = self._writer.register_schema(msgtype, "ros2msg", definition)
+            self._channels[topic] = self._writer.register_channel(
+                topic,
+                "cdr",
+                self._schemas[msgtype],
+                {"offered_qos_profiles": LATCHED if latched else VOLATILE},
+            )
+        self._message(topic, stamp_ns, data)
+
+    def report(self, stamp_ns: int, report: Report) -> None:
+        if REPORT_TOPIC not in self._channels:
+            schema = resources.files("replay").joinpath("schemas/report.schema.json").read_bytes()
+            self._schemas[REPORT_SCHEMA] = self._writer.register_schema(REPORT_SCHEMA, "jsonschema", schema)
+            self._channels[REPORT_TOPIC] = self._writer.register_channel(
+                REPORT_TOPIC, "json", self._schemas[REPORT_SCHEMA]
+            )
+        self._message(REPORT_TOPIC, stamp_ns, _compact(report).encode())
+
+    def _message(self, topic: str, stamp_ns: int, data: bytes) -> None:
+        sequence = self._sequences.get(topic, 0)
+        self._sequences[topic] = sequence + 1
+        self._writer.add_message(self._channels[topic], stamp_ns, data, stamp_ns, sequence)
+
+
+def topic_part(name: str) -> str:
+    """Return a robot's name as a part of a topic: letters, digits, underscores and slashes only."""
+    part = re.sub(r"[^A-Za-z0-9_/]", "_", name).strip("/")
+    return f"_{part}" if part[:1].isdigit() else part
+
+
+def _provenance(event: Started) -> dict[str, str]:
+    return {
+        "version": __version__,
+        "reference": event.robots[0].robot,
+        "robots": _compact([item.robot for item in event.robots]),
+        "settings": _compact(event.settings),
+        "inputs": _compact([_named(item) for item in event.inputs]),
+    }
+
+
+def _named(item: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: item[key] for key in ("name", "format", "size_bytes")}
+
+
+def _compact(value: Mapping[str, Any] | Sequence[Any]) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))

@@ -1,0 +1,155 @@
+"""What a person at the terminal sees: a progress bar on long work, and a table at the end."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from replay.events import Event, Merged, Report, Skipped, Started
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+_WIDTH_WHERE_NO_TERMINAL = 160
+_STYLES = {"reference": "bold", "merged": "green", "unmerged": "yellow", "no_map": "red"}
+
+
+class ProgressSink:
+    """Shows how far the run is; on a terminal only."""
+
+    def __init__(self, console: Console) -> None:
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self._progress: Progress = Progress(
+            TextColumn("merging"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("maps"),
+            TimeRemainingColumn(),
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
+        )
+        self._task: TaskID | None = None
+
+    def take(self, event: Event) -> None:
+        """Move the bar."""
+        if isinstance(event, Started):
+            self._progress.start()
+            total = sum(item.message_count for item in event.robots)
+            self._task = self._progress.add_task("merging", total=total)
+        elif isinstance(event, Merged) and self._task is not None:
+            self._progress.update(self._task, completed=event.done)
+
+    def finish(self) -> None:
+        """Take the bar away."""
+        self._progress.stop()
+
+    def publish(self) -> None:
+        """Do nothing: there is no file."""
+
+    def discard(self) -> None:
+        """Take the bar away."""
+        self._progress.stop()
+
+
+class Narrator:
+    """Says which robots are merged, what was skipped, and at the end where the time went.
+
+    Parameters
+    ----------
+    announce
+        Whether to say which robots were chosen.
+    """
+
+    def __init__(self, console: Console, *, announce: bool) -> None:
+        self._console = console
+        self._announce = announce
+        self._begin_s = perf_counter()
+        self._merge_s = 0.0
+        self._render_s = 0.0
+        self._ticks = 0
+
+    def take(self, event: Event) -> None:
+        """Say what is worth a line, and add up the time."""
+        if isinstance(event, Started) and self._announce:
+            reference, *others = (f"{item.robot} ({item.topic})" for item in event.robots)
+            self._say(f"merging {', '.join(others) or 'nothing else'} into {reference}, the reference")
+        elif isinstance(event, Skipped):
+            self._say(f"skipped a message of {event.topic} at {event.log_time_ns} ns: {event.cause}: {event.detail}")
+        elif isinstance(event, Merged):
+            self._merge_s += event.timing.merge_s
+            self._render_s += event.timing.render_s
+            self._ticks += 1
+
+    def sum_up(self, report: Report, paths: Sequence[str]) -> None:
+        """Say what was skipped, how long it took, and what was written."""
+        skipped, late = sum(report["skipped"].values()), sum(item["late"] for item in report["inputs"])
+        if skipped:
+            causes = ", ".join(f"{count} {cause}" for cause, count in report["skipped"].items())
+            self._say(f"{skipped} messages were skipped: {causes}")
+        if late:
+            self._say(f"{late} messages came too late to be put in order of time and took effect on arrival")
+        self._say(
+            f"{report['updates']} maps at {self._ticks} times in {perf_counter() - self._begin_s:.1f} s: "
+            f"{self._merge_s:.1f} s merging, {self._render_s:.1f} s drawing; wrote {', '.join(paths)}"
+        )
+
+    def _say(self, text: str) -> None:
+        self._console.print(text, markup=False, soft_wrap=True)
+
+    def finish(self) -> None:
+        """Do nothing."""
+
+    def publish(self) -> None:
+        """Do nothing: there is no file."""
+
+    def discard(self) -> None:
+        """Do nothing."""
+
+
+def open_console(*, stderr: bool = False) -> Console:
+    """Return a console; where there is no terminal, lines are not broken at its width."""
+    from rich.console import Console
+
+    stream = sys.stderr if stderr else sys.stdout
+    width = None if stream.isatty() else _WIDTH_WHERE_NO_TERMINAL
+    return Console(stderr=stderr, width=width, highlight=False, soft_wrap=False)
+
+
+def print_table(console: Console, report: Report) -> None:
+    """Print a row for each robot: status, pose, acceptance index, overlap, reason."""
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("robot", "status"):
+        table.add_column(name, no_wrap=True)
+    for name in ("x / m", "y / m", "yaw / °", "acceptance", "overlap"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("reason", overflow="fold")
+    for robot, row in report["robots"].items():
+        status = str(row["status"])
+        table.add_row(
+            Text(robot),
+            Text(status, style=_STYLES[status]),
+            *_pose(row["merged_from_map"]),
+            _figure(row["acceptance"], "{:.3f}"),
+            _figure(row["overlap_m2"], "{:.1f} m²"),
+            Text(row["reason"]["message"]),
+        )
+    console.print(table)
+
+
+def _pose(pose: dict[str, float] | None) -> tuple[str, str, str]:
+    if pose is None:
+        return "–", "–", "–"
+    return f"{pose['x_m']:.2f}", f"{pose['y_m']:.2f}", f"{math.degrees(pose['yaw_rad']):.1f}"
+
+
+def _figure(value: Any, form: str) -> str:  # noqa: ANN401 - a JSON number or null
+    return "–" if value is None else form.format(value)

@@ -1,0 +1,93 @@
+"""Recordings, whatever their format: `open_source` tells which it is by what is in it.
+
+A format is one module with a class that has `SourceClass`'s shape, and one row of `SOURCES`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Protocol, cast
+
+from replay.errors import InputError
+from replay.sources.base import Source
+from replay.sources.boundary import translated
+
+# Tried in this order. The modules are imported for their `recognises` and import what they read with only when they
+# are used.
+SOURCES: dict[str, str] = {
+    "rosbag1": "replay.sources.rosbag1:Rosbag1File",
+    "mcap": "replay.sources.mcap_file:McapFile",
+    "rosbag2": "replay.sources.rosbag2_folder:Rosbag2Folder",
+    "sqlite3": "replay.sources.sqlite3_file:Sqlite3File",
+    "map_server": "replay.sources.map_server:SavedMap",
+}
+
+_HEAD_BYTES = 4096
+_EXPECTED = "a ROS 1 bag, an MCAP file, a ROS 2 bag folder, a .db3 file or the .yaml of a saved map"
+_OTHERS = (
+    ((b"\x28\xb5\x2f\xfd",), "it is compressed with zstd: give the folder of its bag, or decompress it with `zstd -d`"),
+    ((b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"PK\x03\x04", b"\x04\x22\x4d\x18"), "it is an archive: unpack it first"),
+    ((b"P5", b"P2", b"\x89PNG", b"BM"), "it is an image: give the .yaml that describes it as a map"),
+)
+
+
+class SourceClass(Protocol):
+    """What a row of `SOURCES` names."""
+
+    def __call__(self, path: Path) -> Source:
+        """Open a recording."""
+
+    def recognises(self, path: Path, head: bytes) -> bool:
+        """Tell whether this class is the one to open, or to refuse, what is at ``path``.
+
+        ``head`` is how the file begins; nothing for a folder.
+        """
+
+
+def open_source(path: Path) -> Source:
+    """Open the recording at ``path``, whatever its name.
+
+    Raises
+    ------
+    InputError
+        If there is none, or none that can be read.
+    """
+    with translated(path):
+        head = _head(path)
+        for name in SOURCES:
+            source = _source_class(name)
+            if source.recognises(path, head):
+                return source(path)
+        raise InputError(_unknown(path, head))
+
+
+def _source_class(name: str) -> SourceClass:
+    module, _, attribute = SOURCES[name].partition(":")
+    return cast("SourceClass", getattr(import_module(module), attribute))
+
+
+def _head(path: Path) -> bytes:
+    """Return how a file begins; nothing for a folder."""
+    if not path.exists():
+        raise InputError(f"{path}: it does not exist; expected {_EXPECTED}")
+    if path.is_dir():
+        return b""
+    if not path.is_file():
+        raise InputError(f"{path}: this is no regular file; expected {_EXPECTED}")
+    with path.open("rb") as file:
+        head = file.read(_HEAD_BYTES)
+    if not head:
+        raise InputError(f"{path}: the file is empty (0 bytes); expected {_EXPECTED}: copy it again")
+    return head
+
+
+def _unknown(path: Path, head: bytes) -> str:
+    if path.is_dir():
+        bags = sorted(each.name for each in path.iterdir() if each.suffix in {".bag", ".yaml", ".yml"})
+        hint = f"; give one of its files, such as {path / bags[0]}" if bags else ""
+        return f"{path}: this folder is no ROS 2 bag: neither metadata.yaml nor .db3 nor .mcap files are in it{hint}"
+    for magics, hint in _OTHERS:
+        if head.startswith(magics):
+            return f"{path}: this is no recording, {hint}"
+    return f"{path}: this is no recording that can be read: it begins with {head[:8]!r}; expected {_EXPECTED}"

@@ -1,0 +1,83 @@
+"""What every source of recorded messages offers."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Literal, Protocol, Self
+
+Encoding = Literal["cdr", "ros1"]
+
+GRID_TYPE = "nav_msgs/msg/OccupancyGrid"
+UPDATE_TYPE = "map_msgs/msg/OccupancyGridUpdate"
+
+
+@dataclass(frozen=True, slots=True)
+class TopicInfo:
+    """One topic of a recording; ``msgtype`` is in the form ``nav_msgs/msg/OccupancyGrid`` whatever the file says."""
+
+    name: str
+    msgtype: str
+    message_count: int
+
+
+@dataclass(frozen=True, slots=True)
+class RawMessage:
+    """One message as recorded, not yet decoded."""
+
+    topic: str
+    msgtype: str
+    encoding: Encoding
+    log_time_ns: int
+    data: bytes | memoryview
+
+
+@dataclass(frozen=True, slots=True)
+class SourceInfo:
+    """What a recording holds, as far as it is known without reading its messages.
+
+    Parameters
+    ----------
+    format
+        One of the names in `replay.sources.SOURCES`.
+    start_ns, stop_ns
+        Log times of the first and last message of all topics; None where the recording has no clock (saved maps)
+        or no message.
+    topics
+        In order of name.
+    """
+
+    format: str
+    start_ns: int | None
+    stop_ns: int | None
+    topics: tuple[TopicInfo, ...]
+
+
+class Source(Protocol):
+    """One recording, opened for reading. It is never changed.
+
+    All errors of the libraries below leave as `replay.errors.InputError`.
+    """
+
+    path: Path
+
+    @property
+    def info(self) -> SourceInfo:
+        """What the recording holds."""
+
+    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
+        """Yield the messages of these topics in order of log time, ties in the order in which they were written.
+
+        Only what holds these topics is read; memory is bounded by a few chunks, not by the recording.
+        """
+
+    def close(self) -> None:
+        """Release files and temporary copies."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...

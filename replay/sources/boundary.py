@@ -1,0 +1,77 @@
+"""The boundary to the libraries that read recordings: what they raise leaves a source as one clear line."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from replay.errors import InputError
+
+# What any of the libraries may raise when the bytes are not what it expects; each source adds the classes of its own.
+# RuntimeError is lz4's, AssertionError rosbags', struct.error and EOFError everyone's.
+COMMON: tuple[type[Exception], ...] = (
+    OSError,
+    EOFError,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    AssertionError,
+    ArithmeticError,
+    RuntimeError,
+    MemoryError,
+    struct.error,
+)
+
+TEXT_MODE = (
+    "as after a transfer in text mode, which converts line endings: copy it again in binary mode"
+    " (Git: mark it `binary` in .gitattributes)"
+)
+
+
+@contextmanager
+def translated(path: Path, foreign: tuple[type[Exception], ...] = COMMON, *, part: str = "") -> Iterator[None]:
+    """Turn the errors of the libraries below into `InputError` with one line that names the path.
+
+    Parameters
+    ----------
+    foreign
+        The classes to translate; all others pass.
+    part
+        What was read of the file, where that is known, such as "the chunk at byte 4117".
+    """
+    try:
+        yield
+    except foreign as error:
+        raise InputError(_line(path, error, part)) from error
+
+
+def _line(path: Path, error: Exception, part: str) -> str:
+    if isinstance(error, PermissionError):
+        return f"{error.filename or path}: permission denied; make it readable for you and try again"
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename or path}: {error.strerror}; expected a recording that can be read"
+    name, text = type(error).__name__, " ".join(str(error).split())
+    found = f"{name}: {text}" if text else name
+    what = f"{part} cannot be read" if part else "it cannot be read"
+    return f"{path}: {what} ({found}); the recording is damaged or incomplete: copy it again from where it was made"
+
+
+class Closing:
+    """Makes a context manager of whatever has a `close`."""
+
+    def close(self) -> None:
+        """Release files and temporary copies."""
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

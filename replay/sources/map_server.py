@@ -1,0 +1,162 @@
+"""Saved maps: the ``map.yaml`` and image that ``map_saver`` writes and ``nav2_map_server`` loads.
+
+A saved map counts as a recording of one message at time 0.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast, get_args
+
+import numpy as np
+
+from mapmerge.grid import Grid
+from mapmerge.sim2 import Sim2
+from replay.codec import encode_grid
+from replay.errors import InputError
+from replay.sources.base import GRID_TYPE, RawMessage, SourceInfo, TopicInfo
+from replay.sources.boundary import COMMON, Closing, translated
+from replay.sources.map_image import Mode, Pixels, Thresholds, cells_from_pixels
+
+TOPIC = "/map"
+FRAME_ID = "map"
+
+_SUFFIXES = {".yaml", ".yml"}
+_IMAGE_KEY = re.compile(rb"^image[ \t]*:", re.MULTILINE)
+_REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
+_MODES: tuple[Mode, ...] = get_args(Mode)
+_TRUE = {"true", "yes", "on", "y"}
+_FALSE = {"false", "no", "off", "n"}
+
+
+@dataclass(frozen=True, slots=True)
+class _Description:
+    """What the YAML file says."""
+
+    image: Path
+    resolution_m: float
+    map_from_grid: Sim2
+    mode: Mode
+    thresholds: Thresholds
+
+
+@functools.cache
+def _foreign() -> tuple[type[Exception], ...]:
+    import cv2
+    from ruamel.yaml.error import YAMLError
+
+    return (*COMMON, YAMLError, cv2.error)
+
+
+class SavedMap(Closing):
+    """A saved map. Its image is read when its message is asked for."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with translated(path, _foreign()):
+            self._description = _description(path)
+
+    @classmethod
+    def recognises(cls, path: Path, head: bytes) -> bool:
+        """Tell whether this is a YAML file, or a text that names an image."""
+        return path.is_file() and (path.suffix.lower() in _SUFFIXES or _IMAGE_KEY.search(head) is not None)
+
+    @property
+    def info(self) -> SourceInfo:
+        """One map, without a clock."""
+        return SourceInfo("map_server", None, None, (TopicInfo(TOPIC, GRID_TYPE, 1),))
+
+    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
+        """Yield the map, if it is asked for."""
+        if TOPIC not in topics:
+            return
+        with translated(self.path, _foreign()):
+            known = self._description
+            cells = cells_from_pixels(_pixels(known.image), known.mode, known.thresholds)
+            grid = Grid(cells, known.resolution_m, known.map_from_grid)
+            data = encode_grid(grid, FRAME_ID, stamp_ns=0)
+        yield RawMessage(TOPIC, GRID_TYPE, "cdr", 0, data)
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+
+def _description(path: Path) -> _Description:
+    document = _document(path)
+    if "rosbag2_bagfile_information" in document:
+        raise InputError(f"{path}: this is the metadata of a ROS 2 bag; give its folder instead: {path.parent}")
+    missing = [key for key in _REQUIRED if document.get(key) is None]
+    if missing:
+        raise InputError(
+            f"{path}: the key '{missing[0]}' is missing; expected the description of a saved map with "
+            f"{', '.join(_REQUIRED)}"
+        )
+    image = path.parent / str(document["image"])
+    if not image.is_file():
+        raise InputError(f"{path}: its image {image} does not exist; copy it to that place, or correct 'image'")
+    origin = document["origin"]
+    if not isinstance(origin, list) or len(origin) != 3:
+        raise InputError(f"{path}: 'origin' is {origin}; expected [x, y, yaw] in metres and radians")
+    x_m, y_m, yaw_rad = (_number(path, "origin", each) for each in origin)
+    return _Description(
+        image,
+        _number(path, "resolution", document["resolution"]),
+        Sim2(x_m, y_m, yaw_rad),
+        _mode(path, document),
+        Thresholds(
+            _number(path, "occupied_thresh", document["occupied_thresh"]),
+            _number(path, "free_thresh", document["free_thresh"]),
+            _flag(path, document["negate"]),
+        ),
+    )
+
+
+def _document(path: Path) -> dict[str, Any]:
+    from ruamel.yaml import YAML
+
+    document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    if not isinstance(document, dict):
+        raise InputError(f"{path}: the key '{_REQUIRED[0]}' is missing; expected the description of a saved map")
+    return document
+
+
+def _number(path: Path, key: str, value: object) -> float:
+    """Return a number; YAML 1.2 takes some that the map server reads, such as 5e-2, for text."""
+    try:
+        return float(cast("str", value))
+    except (TypeError, ValueError):
+        raise InputError(f"{path}: '{key}' holds {value!r}; a number was expected") from None
+
+
+def _flag(path: Path, value: object) -> bool:
+    text = str(value).lower()
+    if text in _TRUE or text in _FALSE:
+        return text in _TRUE
+    if isinstance(value, int):
+        return value != 0
+    raise InputError(f"{path}: 'negate' is {value}; expected 0 or 1")
+
+
+def _mode(path: Path, document: dict[str, Any]) -> Mode:
+    name = str(document.get("mode") or _MODES[0]).lower()
+    for mode in _MODES:
+        if mode == name:
+            return mode
+    raise InputError(f"{path}: 'mode' is {document['mode']}; expected one of {', '.join(_MODES)}")
+
+
+def _pixels(path: Path) -> Pixels:
+    """Return the pixels of an image as they are stored, 8 bits a channel."""
+    import cv2
+
+    # Not imread, which cannot open every name on Windows and prints a warning of its own.
+    pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None:
+        raise InputError(f"{path}: this is no image that can be read; expected PGM, PNG or BMP")
+    if pixels.dtype != np.uint8:
+        raise InputError(f"{path}: the image is {pixels.dtype}; expected 8 bits a channel: convert it to 8 bits")
+    return pixels.astype(np.uint8, copy=False)

@@ -1,0 +1,34 @@
+"""The compression of ROS 2 bags: of whole files, or of each message.
+
+rosbags brings this implementation along. The other one at hand, ``zstandard``, ends a file that was cut off without a
+word.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
+
+MAGIC = b"\x28\xb5\x2f\xfd"
+
+ZstdError = zstd.ZstdError
+
+
+def decompress_file(source: Path, target: Path) -> None:
+    """Decompress a file as a stream."""
+    with zstd.open(source, "rb") as compressed, target.open("wb") as plain:
+        shutil.copyfileobj(compressed, plain)
+
+
+def decompressed_cdr(data: bytes) -> bytes:
+    """Return a message in CDR as it was before a bag with message compression stored it.
+
+    No message in CDR begins like compressed data, so that this needs no metadata.
+    """
+    return zstd.decompress(data) if data.startswith(MAGIC) else data
