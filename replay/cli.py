@@ -6,6 +6,7 @@ import argparse
 import os
 import signal
 import sys
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -45,7 +46,8 @@ exit status: 0 done; 1 a robot was not merged and --require-all was given; 2 bad
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program and return its exit status."""
-    signal.signal(signal.SIGTERM, _terminate)
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, _terminate)
     try:
         return _dispatch(_parser().parse_args(arguments))
     except ReplayError as error:
@@ -74,12 +76,23 @@ def _dispatch(options: argparse.Namespace) -> int:
     return _info(options) if options.command == "info" else _merge(options)
 
 
+class _Help(argparse.RawDescriptionHelpFormatter):
+    """Help that reads the same in every version of Python: docs/cli.md is checked against it."""
+
+    def _format_action_invocation(self, action: argparse.Action) -> str:
+        if not action.option_strings or action.nargs == 0:
+            return super()._format_action_invocation(action)
+        value = self._format_args(action, self._get_default_metavar_for_optional(action))
+        return f"{', '.join(action.option_strings)} {value}"
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="replay",
+        usage="replay COMMAND ...",
         description="Merge the occupancy grid maps that several robots recorded, offline, at each timestamp.",
         epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=_Help,
         allow_abbrev=False,
     )
     parser.add_argument("--version", action="version", version=f"replay {__version__}")
@@ -87,10 +100,11 @@ def _parser() -> argparse.ArgumentParser:
     merge = commands.add_parser(
         "merge",
         help="merge the maps of a recording and write what came of it",
-        description="Merge the maps of one or more recordings at each timestamp, and write the outcome to a new MCAP, "
+        usage="replay merge RUN [RUN ...] [options]",
+        description="Merge the maps of one or more recordings at each timestamp, and write the outcome to a new MCAP,\n"
         "a Rerun recording and a JSON report.",
         epilog=_MERGE_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=_Help,
         allow_abbrev=False,
     )
     _input_arguments(merge)
@@ -98,8 +112,10 @@ def _parser() -> argparse.ArgumentParser:
     info = commands.add_parser(
         "info",
         help="list what recordings hold and what would be merged",
-        description="List format, duration, map topics, messages, sizes and resolutions of recordings, and what "
-        "would be merged.",
+        usage="replay info RUN [RUN ...] [options]",
+        description="List format, duration, map topics, messages, sizes and resolutions of recordings,\n"
+        "and what would be merged.",
+        formatter_class=_Help,
         allow_abbrev=False,
     )
     _input_arguments(info)
@@ -209,7 +225,7 @@ def _output_options(options: argparse.Namespace, run: RunOptions) -> OutputOptio
     from replay.options import OutputOptions, seconds_to_ns
 
     first = run.runs[0].path
-    stem = first.resolve().name if first.is_dir() else first.name.partition(".")[0] or first.name
+    stem = first.resolve().name if first.is_dir() else first.stem
     path = options.output or Path(f"{stem}.merged.mcap")
     if path.suffix != ".mcap":
         raise UsageError(f"--output {path}: expected a name that ends in .mcap")
@@ -243,15 +259,16 @@ def _merge(options: argparse.Namespace) -> int:
     outputs = _output_options(options, run)
     _refuse_outputs(outputs, run)
 
-    from replay.pipeline import drain, merge
+    from replay.pipeline import drain, events
+    from replay.plan import open_plan
     from replay.sinks import open_sinks, output_paths
     from replay.sinks.json_file import report_text
     from replay.sinks.terminal import Narrator, ProgressSink, open_console, print_table
 
     notes = open_console(stderr=True)
     narrator = Narrator(notes, announce=run.robots is None)
-    with open_sinks(outputs, extra=(ProgressSink(notes), narrator)) as sinks:
-        report = drain(merge(run), sinks).report
+    with open_plan(run) as plan, open_sinks(outputs, extra=(ProgressSink(notes), narrator)) as sinks:
+        report = drain(events(plan, run), sinks).report
     if options.json:
         sys.stdout.write(report_text(report))
     else:

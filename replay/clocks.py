@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -75,14 +76,10 @@ def frames(robots: Sequence[str], frame_ids: Mapping[str, str], merged_frame: st
     It is the recorded one, its leading slash stripped, where that is unique in the run; else the robot's name and
     the frame, as ``r1/map``.
     """
-    bare = {robot: frame_ids.get(robot, "").strip("/") or "map" for robot in robots}
-    taken = list(bare.values())
-    return {
-        robot: frame
-        if taken.count(frame) == 1 and frame_ids.get(robot) and frame != merged_frame
-        else f"{robot}/{frame}"
-        for robot, frame in bare.items()
-    }
+    bare = {robot: frame_ids.get(robot, "").lstrip("/") for robot in robots}
+    prefixed = {robot: f"{robot}/{frame or 'map'}" for robot, frame in bare.items()}
+    taken = Counter([*bare.values(), *prefixed.values(), merged_frame])
+    return {robot: frame if frame and taken[frame] == 1 else prefixed[robot] for robot, frame in bare.items()}
 
 
 def offsets_ns(reference: str, probes: Sequence[Probe], *, align_starts: bool) -> dict[tuple[int, str], int]:

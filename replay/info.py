@@ -140,7 +140,7 @@ def lines(summary: RunSummary) -> Iterator[str]:
     """Yield the summary as lines to read."""
     for item in summary.inputs:
         duration = f"{item.duration_s:.1f} s" if item.duration_s is not None else "no clock"
-        yield f"{item.path}: {item.format}, {duration}, {item.messages} messages"
+        yield f"{item.path}: {item.format}, {duration}, {_counted(item.messages)}"
         yield from _columns([_row(topic) for topic in item.topics])
     if summary.problem is not None:
         yield f"nothing would be merged: {summary.problem}"
@@ -154,12 +154,16 @@ def _row(topic: TopicSummary) -> tuple[str, ...]:
     return (
         topic.name,
         topic.msgtype,
-        f"{topic.messages} messages" + (f" ({topic.unusable} unusable)" if topic.unusable else ""),
+        _counted(topic.messages) + (f" ({topic.unusable} unusable)" if topic.unusable else ""),
         sizes,
         ", ".join(f"{resolution:g} m" for resolution in topic.resolutions_m),
         f"frame {', '.join(topic.frames)}" if any(topic.frames) else "no frame",
         "header times" if topic.header_times else "log times only",
     )
+
+
+def _counted(messages: int) -> str:
+    return "1 message" if messages == 1 else f"{messages} messages"
 
 
 def _columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:

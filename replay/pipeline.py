@@ -16,7 +16,7 @@ from replay.sinks.base import Sink
 from replay.timeline import Tally, ticks
 
 
-def run(plan: Plan, options: RunOptions) -> Iterator[Event]:
+def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
     """Replay what was planned and yield what happens."""
     settings = options.settings()
     report = ReportBuilder(plan.robots, settings, __version__)
@@ -52,13 +52,13 @@ def merge(options: RunOptions) -> Iterator[Event]:
         If an input cannot be read, or the robots that were asked for are not there.
     """
     with open_plan(options) as plan:
-        yield from run(plan, options)
+        yield from events(plan, options)
 
 
-def drain(events: Iterable[Event], sinks: Iterable[Sink]) -> Finished:
+def drain(stream: Iterable[Event], sinks: Iterable[Sink]) -> Finished:
     """Give each event to each sink, and return the last event."""
     targets = tuple(sinks)
-    for event in events:
+    for event in stream:
         for sink in targets:
             sink.take(event)
         if isinstance(event, Finished):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,13 +84,16 @@ def select(
     UsageError
         If a robot is not there or its topic is ambiguous; the text lists what is there, as flags to paste.
     """
-    if not any(_grid_topics(info) for info in infos):
+    counts = Counter[str]()
+    for info in infos:
+        counts.update({topic.name: topic.message_count for topic in info.topics if topic.msgtype == GRID_TYPE})
+    if not counts.total():
         raise InputError(_nothing(runs, infos))
-    found = _discovered(runs, infos, topics)
+    found = _discovered(runs, infos, topics, counts)
     wanted = list(robots) if robots is not None else _all_names(runs, found)
     selected = []
     for robot in wanted:
-        candidates = found.get(robot) or _by_component(robot, runs, infos, topics)
+        candidates = found.get(robot) or _by_component(robot, runs, infos, topics, counts)
         selected.append(_one(robot, candidates, found))
     _refuse_shared(selected)
     return tuple(selected)
@@ -99,11 +103,14 @@ Candidates = dict[str, tuple[int, ...]]
 
 
 def _grid_topics(info: SourceInfo) -> list[str]:
-    return sorted(topic.name for topic in info.topics if topic.msgtype == GRID_TYPE and topic.message_count > 0)
+    return sorted(topic.name for topic in info.topics if topic.msgtype == GRID_TYPE)
 
 
 def _discovered(
-    runs: Sequence[RunPath], infos: Sequence[SourceInfo], topics: Sequence[TopicChoice]
+    runs: Sequence[RunPath],
+    infos: Sequence[SourceInfo],
+    topics: Sequence[TopicChoice],
+    counts: Mapping[str, int],
 ) -> dict[str, Candidates]:
     """Return for each robot that can be named the map topics that may be its own."""
     found: dict[str, Candidates] = {}
@@ -116,7 +123,10 @@ def _discovered(
     for choice in topics:
         if choice.robot is not None:
             found[choice.robot] = _said_outright(choice, runs, infos)
-    return {robot: _best(robot, candidates) for robot, candidates in found.items()}
+    best = {robot: _best(robot, candidates, counts) for robot, candidates in found.items()}
+    asked = {run.robot for run in runs} | {choice.robot for choice in topics}
+    maps = {robot for robot, candidates in best.items() if not all(map(_NOT_A_MAP.search, candidates))}
+    return {robot: candidates for robot, candidates in best.items() if not maps or robot in maps | asked}
 
 
 def _names_in(run: RunPath, topics: Sequence[str]) -> dict[str, str]:
@@ -167,7 +177,11 @@ def _said_outright(choice: TopicChoice, runs: Sequence[RunPath], infos: Sequence
 
 
 def _by_component(
-    robot: str, runs: Sequence[RunPath], infos: Sequence[SourceInfo], topics: Sequence[TopicChoice]
+    robot: str,
+    runs: Sequence[RunPath],
+    infos: Sequence[SourceInfo],
+    topics: Sequence[TopicChoice],
+    counts: Mapping[str, int],
 ) -> Candidates:
     """Return the map topics with the robot's name anywhere in their namespace."""
     found: Candidates = {}
@@ -177,20 +191,24 @@ def _by_component(
             patterned = any(choice.robot is None for choice in topics) and _chosen(robot, topic, topics)
             if run.robot is None and (patterned or (inside and _chosen(robot, topic, topics))):
                 found[topic] = (*found.get(topic, ()), index)
-    return _best(robot, found)
+    return _best(robot, found, counts)
 
 
-def _best(robot: str, candidates: Candidates) -> Candidates:
-    """Keep what is most like a robot's map: ``/robot/map``, then ``…/map``, then any map, then costmaps and masks."""
+def _best(robot: str, candidates: Candidates, counts: Mapping[str, int]) -> Candidates:
+    """Keep what is most like a robot's map: ``/robot/map``, then ``…/map``, then any map, then costmaps and masks.
 
-    def rank(topic: str) -> int:
+    A topic without messages is taken only where there is none with.
+    """
+
+    def rank(topic: str) -> tuple[bool, int]:
+        empty = counts[topic] == 0
         if _NOT_A_MAP.search(topic):
-            return 3
+            return empty, 3
         if topic == f"/{robot}/map":
-            return 0
-        return 1 if topic.rsplit("/", 1)[-1] == "map" else 2
+            return empty, 0
+        return empty, 1 if topic.rsplit("/", 1)[-1] == "map" else 2
 
-    best = min(map(rank, candidates), default=0)
+    best = min(map(rank, candidates), default=None)
     return {topic: inputs for topic, inputs in candidates.items() if rank(topic) == best}
 
 

@@ -71,7 +71,7 @@ class Tally:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tick:
-    """All maps of one time."""
+    """All maps of one time; ``messages`` were read since the tick before."""
 
     stamp_ns: int
     grids: Mapping[str, Grid]
@@ -105,9 +105,9 @@ def ticks(feeds: Sequence[Feed], tallies: Sequence[Tally], window: Window, *, st
     """
     streams = [_in_order(feed, tally, window) for feed, tally in zip(feeds, tallies, strict=True)]
     latest: dict[str, Grid] = {}
+    messages = 0
     for time_ns, arrivals in groupby(heapq.merge(*streams, key=_stamp), key=_stamp):
         changed: dict[str, Grid] = {}
-        messages = 0
         for skipped in _take(arrivals, latest, changed):
             if skipped is not None:
                 if strict:
@@ -116,7 +116,9 @@ def ticks(feeds: Sequence[Feed], tallies: Sequence[Tally], window: Window, *, st
                     )
                 yield skipped
             messages += 1
-        yield Tick(time_ns, changed, messages)
+        if changed:
+            yield Tick(time_ns, changed, messages)
+            messages = 0
 
 
 def _stamp(arrival: _Arrival) -> int:

@@ -19,13 +19,20 @@ from mcap.writer import CompressionType, Writer
 from mapmerge.grid import Grid
 from mapmerge.merger import MergeResult
 from replay import __version__
-from replay.codec import encode_grid, ros2_message_definition
+from replay.codec import (
+    IMAGE_TYPE,
+    TF_TYPE,
+    FrameTransform,
+    encode_grid,
+    encode_image,
+    encode_transforms,
+    ros2_message_definition,
+)
 from replay.events import Event, Finished, Merged, Report, RobotInput, RobotPicture, Started
 from replay.options import OutputOptions
 from replay.plan import MERGED_FRAME
 from replay.sinks.partial_file import PartialFile, output_errors
 from replay.sinks.qos import LATCHED, VOLATILE
-from replay.sinks.ros2_messages import IMAGE_TYPE, TF_TYPE, FrameTransform, encode_image, encode_transforms
 from replay.sources.base import GRID_TYPE
 
 MAP_TOPIC = "/merged/map"

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
-_WIDTH_WHERE_NO_TERMINAL = 160
+_WIDTH_WHERE_NO_TERMINAL = 400
 _STYLES = {"reference": "bold", "merged": "green", "unmerged": "yellow", "no_map": "red"}
 
 

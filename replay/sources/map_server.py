@@ -76,7 +76,7 @@ class SavedMap(Closing):
             return
         with translated(self.path, _foreign()):
             known = self._description
-            cells = cells_from_pixels(_pixels(known.image), known.mode, known.thresholds)
+            cells = cells_from_pixels(_pixels(self.path, known.image), known.mode, known.thresholds)
             grid = Grid(cells, known.resolution_m, known.map_from_grid)
             data = encode_grid(grid, FRAME_ID, stamp_ns=0)
         yield RawMessage(TOPIC, GRID_TYPE, "cdr", 0, data)
@@ -149,14 +149,17 @@ def _mode(path: Path, document: dict[str, Any]) -> Mode:
     raise InputError(f"{path}: 'mode' is {document['mode']}; expected one of {', '.join(_MODES)}")
 
 
-def _pixels(path: Path) -> Pixels:
-    """Return the pixels of an image as they are stored, 8 bits a channel."""
+def _pixels(path: Path, image: Path) -> Pixels:
+    """Return the pixels of a map's image as they are stored, 8 bits a channel."""
     import cv2
 
-    # Not imread, which cannot open every name on Windows and prints a warning of its own.
-    pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+    # Not imread, which cannot open every name on Windows.
+    content = np.fromfile(image, np.uint8)
+    pixels = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
     if pixels is None:
-        raise InputError(f"{path}: this is no image that can be read; expected PGM, PNG or BMP")
+        raise InputError(f"{path}: its image {image} cannot be read; expected PGM, PNG or BMP")
     if pixels.dtype != np.uint8:
-        raise InputError(f"{path}: the image is {pixels.dtype}; expected 8 bits a channel: convert it to 8 bits")
+        raise InputError(
+            f"{path}: its image {image} is {pixels.dtype}; expected 8 bits a channel: convert it to 8 bits"
+        )
     return pixels.astype(np.uint8, copy=False)

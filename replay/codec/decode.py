@@ -1,13 +1,7 @@
-"""Messages as bytes ↔ messages as values: the only place that knows how ROS serialises a map.
-
-Every recording is decoded with the definitions of the messages that are built in here, not with those that it carries:
-``nav_msgs/OccupancyGrid`` has not changed since ROS 1 Fuerte, and a recording without definitions reads as well as
-any other.
-"""
+"""Recorded bytes → maps and updates of maps."""
 
 from __future__ import annotations
 
-import functools
 import math
 import struct
 from typing import TYPE_CHECKING, Protocol, cast
@@ -16,12 +10,12 @@ import numpy as np
 
 from mapmerge.grid import MAX_SIDE_CELLS, UNKNOWN, Cells, Grid
 from mapmerge.sim2 import Sim2
-from replay.errors import BadMessage, OutputError
+from replay.codec.typestores import ros1_typestore, ros2_typestore
+from replay.errors import BadMessage
 from replay.messages import GridMessage, UpdateMessage
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, RawMessage
 
 if TYPE_CHECKING:
-    from rosbags.typesys.store import Typestore
     from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Pose as Pose
     from rosbags.typesys.stores.ros2_jazzy import nav_msgs__msg__OccupancyGrid as OccupancyGrid
     from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Header as Header
@@ -29,15 +23,6 @@ if TYPE_CHECKING:
 MAX_TILT_RAD = math.radians(5.0)
 
 _NS = 1_000_000_000
-_UPDATE_DEFINITION = """\
-std_msgs/Header header
-int32 x
-int32 y
-uint32 width
-uint32 height
-int8[] data
-"""
-_TF_DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
 
 
 class _OccupancyGridUpdate(Protocol):
@@ -49,33 +34,6 @@ class _OccupancyGridUpdate(Protocol):
     width: int
     height: int
     data: Cells
-
-
-@functools.cache
-def ros2_typestore() -> Typestore:
-    """Return the ROS 2 message definitions, with ``map_msgs/OccupancyGridUpdate``."""
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    store = get_typestore(Stores.ROS2_JAZZY)
-    store.register(get_types_from_msg(_UPDATE_DEFINITION, UPDATE_TYPE))
-    return store
-
-
-@functools.cache
-def ros1_typestore() -> Typestore:
-    """Return the ROS 1 message definitions, with ``map_msgs/OccupancyGridUpdate`` and ``tf2_msgs/TFMessage``."""
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    store = get_typestore(Stores.ROS1_NOETIC)
-    store.register(get_types_from_msg(_UPDATE_DEFINITION, UPDATE_TYPE))
-    store.register(get_types_from_msg(_TF_DEFINITION, "tf2_msgs/msg/TFMessage"))
-    return store
-
-
-def ros2_message_definition(msgtype: str) -> str:
-    """Return the text of a ROS 2 message definition with all it depends on, as MCAP's ``ros2msg`` wants it."""
-    text, _ = ros2_typestore().generate_msgdef(msgtype, ros_version=2)
-    return text
 
 
 def decode(raw: RawMessage) -> GridMessage | UpdateMessage:
@@ -102,45 +60,6 @@ def decode(raw: RawMessage) -> GridMessage | UpdateMessage:
     return _grid(cast("OccupancyGrid", message))
 
 
-def encode_grid(grid: Grid, frame_id: str, stamp_ns: int) -> bytes:
-    """Return the grid as a ROS 2 ``nav_msgs/OccupancyGrid`` in CDR.
-
-    Parameters
-    ----------
-    stamp_ns
-        For ``header.stamp``, which ends in the year 2038; ``map_load_time`` is left at 0.
-
-    Raises
-    ------
-    OutputError
-        If the stamp does not fit the message.
-    """
-    store = ros2_typestore()
-    sec, nanosec = divmod(stamp_ns, _NS)
-    if not -(2**31) <= sec < 2**31:
-        raise OutputError(f"the time {stamp_ns} ns does not fit a ROS 2 stamp, which has 32 bits for the seconds")
-    types = store.types
-    time = types["builtin_interfaces/msg/Time"]
-    pose = grid.map_from_grid
-    half_yaw = 0.5 * pose.yaw_rad
-    origin = types["geometry_msgs/msg/Pose"](
-        position=types["geometry_msgs/msg/Point"](x=pose.x_m, y=pose.y_m, z=0.0),
-        orientation=types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=math.sin(half_yaw), w=math.cos(half_yaw)),
-    )
-    message = types[GRID_TYPE](
-        header=types["std_msgs/msg/Header"](stamp=time(sec=sec, nanosec=nanosec), frame_id=frame_id),
-        info=types["nav_msgs/msg/MapMetaData"](
-            map_load_time=time(sec=0, nanosec=0),
-            resolution=grid.resolution_m,
-            width=grid.cols,
-            height=grid.rows,
-            origin=origin,
-        ),
-        data=np.ascontiguousarray(grid.cells).reshape(-1),
-    )
-    return bytes(store.serialize_cdr(message, GRID_TYPE, little_endian=True))
-
-
 def _deserialized(raw: RawMessage) -> object:
     from rosbags.serde import SerdeError
 
@@ -164,8 +83,13 @@ def _grid(message: OccupancyGrid) -> GridMessage:
     cells = _cells(message.data, info.width, info.height)
     if not (math.isfinite(info.resolution) and info.resolution > 0.0):
         raise BadMessage("bad_resolution", f"the resolution is {info.resolution} m; a positive number was expected")
-    grid = Grid(cells, info.resolution, _flat_pose(info.origin))
+    grid = Grid(cells, _shortest(info.resolution), _flat_pose(info.origin))
     return GridMessage(_stamp_ns(message.header), message.header.frame_id, grid)
+
+
+def _shortest(single: float) -> float:
+    """Return the number of fewest digits that is the same in single precision: 0.05, not 0.05000000074505806."""
+    return float(str(np.float32(single)))
 
 
 def _update(message: _OccupancyGridUpdate) -> UpdateMessage:

@@ -1,0 +1,25 @@
+"""Messages as bytes ↔ messages as values: the only place that knows how ROS serialises a map."""
+
+from replay.codec.decode import decode
+from replay.codec.encode import (
+    IMAGE_TYPE,
+    TF_TYPE,
+    FrameTransform,
+    encode_grid,
+    encode_image,
+    encode_transforms,
+)
+from replay.codec.typestores import ros1_typestore, ros2_message_definition, ros2_typestore
+
+__all__ = [
+    "IMAGE_TYPE",
+    "TF_TYPE",
+    "FrameTransform",
+    "decode",
+    "encode_grid",
+    "encode_image",
+    "encode_transforms",
+    "ros1_typestore",
+    "ros2_message_definition",
+    "ros2_typestore",
+]

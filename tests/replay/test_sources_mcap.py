@@ -1,0 +1,244 @@
+from __future__ import annotations
+
+import io
+import struct
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.data_stream import RecordBuilder
+from mcap.reader import make_reader
+from mcap.records import Channel, Message, Schema
+from mcap.writer import IndexType, Writer
+
+from replay.errors import InputError
+from replay.sources import mcap_index, open_source
+from replay.sources.chunks import HELD_CHUNKS, ChunkCache
+from replay.sources.mcap_records import MAGIC
+from tests import bags
+from tests.bags import NO_INDEX, NO_SUMMARY, SAMPLE, START, in_order
+from tests.replay.test_sources_open import refused
+
+TOPICS = {"/r1/map", "/r2/map", "/r1/map_updates"}
+
+
+def _times(path: Path, *topics: str) -> list[int]:
+    with open_source(path) as source:
+        return [each.log_time_ns for each in source.messages(topics or TOPICS)]
+
+
+def _expected(*topics: str) -> list[int]:
+    return [each.log_time_ns for each in in_order(SAMPLE, topics or TOPICS)]
+
+
+# --- with and without an index
+
+
+@pytest.mark.parametrize("options", [NO_INDEX, NO_SUMMARY])
+def test_without_an_index_damage_anywhere_is_found(tmp_path: Path, options: dict[str, Any]) -> None:
+    chunk = next(each for each in bags.chunks(bags.write_mcap(tmp_path / "a.mcap")) if each.topics == {"/chatter"})
+    path = bags.write_mcap(tmp_path / "b.mcap", **options)
+    bags.damage(path, chunk)
+    refused(path, "the chunk at byte")
+
+
+def test_with_an_index_the_file_is_not_passed_through(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = bags.write_mcap(tmp_path / "a.mcap")
+    monkeypatch.setattr("replay.sources.mcap_file.scan", None)
+    assert _times(path) == _expected()
+
+
+def test_a_channel_that_is_indexed_in_part_is_passed_through(tmp_path: Path) -> None:
+    """A message of an indexed channel lies outside of the chunks; only the statistics know of it."""
+    path = bags.write_mcap(tmp_path / "a.mcap")
+    data = path.read_bytes()
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    (channel,) = (key for key, each in summary.channels.items() if each.topic == "/r1/map")
+    # Put it at the end of the data, and count it in the statistics.
+    loose = RecordBuilder()
+    Message(channel, START + 7, bags.as_cdr(SAMPLE[1]), START + 7, 0).write(loose)
+    record = loose.end()
+    summary_start, _, _ = struct.unpack("<QQI", data[-28:-8])
+    data_end = summary_start - 13
+    counted = summary.statistics
+    old, new = RecordBuilder(), RecordBuilder()
+    counted.write(old)
+    counted.channel_message_counts[channel] += 1
+    counted.message_count += 1
+    counted.write(new)
+    tail = data[data_end:-28].replace(old.end(), new.end())
+    footer = struct.pack("<QQI", summary_start + len(record), 0, 0)
+    path.write_bytes(data[:data_end] + record + tail + footer + MAGIC)
+
+    assert _times(path, "/r1/map") == sorted([*_expected("/r1/map"), START + 7])
+    assert _times(path, "/r2/map") == _expected("/r2/map")
+
+
+def test_a_damaged_summary_is_not_believed(tmp_path: Path) -> None:
+    path = bags.write_mcap(tmp_path / "a.mcap")
+    data = bytearray(path.read_bytes())
+    data[-100] ^= 0xFF
+    path.write_bytes(data)
+    assert _times(path) == _expected()
+
+
+def test_other_topics_of_an_unindexed_file_are_found_when_asked_for(tmp_path: Path) -> None:
+    path = bags.write_mcap(tmp_path / "a.mcap", **NO_SUMMARY)
+    assert _times(path, "/chatter", "/r1/map") == _expected("/chatter", "/r1/map")
+
+
+def test_an_unindexed_file_is_read_a_chunk_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = bags.write_mcap(tmp_path / "a.mcap", **NO_SUMMARY)
+    loaded: list[int] = []
+    original = mcap_index.RecordFile.chunk
+    monkeypatch.setattr(
+        mcap_index.RecordFile, "chunk", lambda self, start: (loaded.append(start), original(self, start))[1]
+    )
+    with open_source(path) as source:
+        in_scan = len(loaded)
+        assert loaded == sorted(set(loaded))
+        messages = source.messages(["/r1/map"])
+        next(messages)
+        assert len(loaded) == in_scan + 1
+
+
+def test_messages_outside_of_chunks_beside_chunks(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    chunked = bags.write_mcap(tmp_path / "b.mcap", SAMPLE[:5]).read_bytes()
+    unchunked = bags.write_mcap(tmp_path / "c.mcap", SAMPLE[5:], use_chunking=False).read_bytes()
+    # Cut both down to their data; channels are registered in another order, so that the second must stand first.
+    first, second = (data[: struct.unpack("<Q", data[-28:-20])[0] - 13] for data in (chunked, unchunked))
+    header_end = 8 + 9 + struct.unpack("<Q", second[9:17])[0]
+    footer = b"\x0f" + struct.pack("<QI", 4, 0) + b"\x02" + struct.pack("<QQQI", 20, 0, 0, 0) + MAGIC
+    path.write_bytes(first + second[header_end:] + footer)
+    with open_source(path) as source:
+        assert sum(each.message_count for each in source.info.topics) == len(SAMPLE)
+    assert len(_times(path, *TOPICS, "/chatter")) == len(SAMPLE)
+
+
+# --- files that were cut off or damaged
+
+
+@pytest.mark.parametrize("options", [{}, NO_SUMMARY, {"use_chunking": False}])
+def test_every_truncation_says_where_the_file_ends(tmp_path: Path, options: dict[str, Any]) -> None:
+    data = bags.write_mcap(tmp_path / "whole.mcap", SAMPLE[1:4], **options).read_bytes()
+    for length in range(len(MAGIC), len(data), 61):
+        path = tmp_path / "cut.mcap"
+        path.write_bytes(data[:length])
+        refused(path, f"ends early at byte {length}", "mcap recover")
+
+
+def test_space_that_was_reserved_and_not_written(tmp_path: Path) -> None:
+    data = bags.write_mcap(tmp_path / "whole.mcap").read_bytes()
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(data[:3000] + bytes(5000))
+    refused(path)
+
+
+def test_bytes_after_the_end_do_not_matter(tmp_path: Path) -> None:
+    path = bags.write_mcap(tmp_path / "a.mcap")
+    path.write_bytes(path.read_bytes() + bytes(1000))
+    assert _times(path) == _expected()
+
+
+def test_flipped_bytes_are_one_line_or_harmless(tmp_path: Path) -> None:
+    data = bags.write_mcap(tmp_path / "whole.mcap", SAMPLE[1:4], compression="none").read_bytes()
+    path = tmp_path / "flipped.mcap"
+    for index in range(8, len(data), 37):
+        flipped = bytearray(data)
+        flipped[index] ^= 0xFF
+        path.write_bytes(flipped)
+        try:
+            _times(path)
+        except InputError as error:
+            assert "\n" not in str(error)  # noqa: PT017
+
+
+def test_unknown_compression(tmp_path: Path) -> None:
+    path = bags.write_mcap(tmp_path / "a.mcap", compression="zstd")
+    path.write_bytes(path.read_bytes().replace(b"\x04\0\0\0zstd", b"\x04\0\0\0brot"))
+    refused(path, "'brot'", "lz4")
+
+
+# --- channels
+
+
+def test_maps_in_another_encoding_are_listed_and_refused(tmp_path: Path) -> None:
+    path = bags.write_mcap(tmp_path / "a.mcap", encoding="json")
+    with open_source(path) as source:
+        assert ("/r1/map", "nav_msgs/msg/OccupancyGrid (json)") in {(t.name, t.msgtype) for t in source.info.topics}
+    refused(path, "'json'", "cdr or ros1")
+
+
+def test_channels_without_a_schema_do_no_harm(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel("/odd", "", 0)
+        writer.add_message(channel, 5, b"", 5)
+        writer.finish()
+    with open_source(path) as source:
+        assert [(t.name, t.msgtype, t.message_count) for t in source.info.topics] == [
+            ("/odd", "unknown (no encoding)", 1)
+        ]
+
+
+def test_several_channels_of_one_topic_are_one(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2")
+        schema = writer.register_schema("nav_msgs/msg/OccupancyGrid", "ros2msg", b"")
+        for publisher in range(3):
+            channel = writer.register_channel("/map", "cdr", schema, metadata={"publisher": str(publisher)})
+            for each in range(2):
+                writer.add_message(channel, 10 * each + publisher, b"data", 0)
+        writer.finish()
+    with open_source(path) as source:
+        assert [(t.name, t.message_count) for t in source.info.topics] == [("/map", 6)]
+    assert _times(path, "/map") == [0, 1, 2, 10, 11, 12]
+
+
+def test_a_message_of_no_channel(tmp_path: Path) -> None:
+    records = RecordBuilder()
+    Schema(1, b"", "ros2msg", "nav_msgs/msg/OccupancyGrid").write(records)
+    Channel(1, "/map", "cdr", {}, 1).write(records)
+    Message(2, 0, b"data", 0, 0).write(records)
+    path = tmp_path / "a.mcap"
+    path.write_bytes(MAGIC + records.end())
+    refused(path, "channel 2")
+
+
+def test_file_without_messages(tmp_path: Path) -> None:
+    for name, options in (("a", {}), ("b", NO_SUMMARY), ("c", {"index_types": IndexType.NONE})):
+        with open_source(bags.write_mcap(tmp_path / f"{name}.mcap", [], **options)) as source:
+            assert (source.info.topics, source.info.start_ns, source.info.stop_ns) == ((), None, None)
+
+
+# --- memory
+
+
+def test_only_a_few_chunks_are_held() -> None:
+    loads: list[int] = []
+
+    def load(offset: int) -> bytes:
+        loads.append(offset)
+        return b"%d" % offset
+
+    cache = ChunkCache(load)
+    for offset in (*range(HELD_CHUNKS), *range(HELD_CHUNKS)):
+        assert cache[offset] == b"%d" % offset
+    assert loads == list(range(HELD_CHUNKS))
+    cache[99], cache[1], cache[0]
+    assert loads == [*range(HELD_CHUNKS), 99, 0]
+
+
+def test_message_data_do_not_keep_their_chunk(tmp_path: Path) -> None:
+    with open_source(bags.write_mcap(tmp_path / "a.mcap", chunk_bytes=1 << 20)) as source:
+        message = next(iter(source.messages(["/r1/map"])))
+    assert isinstance(message.data, bytes)
+    assert io.BytesIO(message.data).getbuffer().nbytes < 3000

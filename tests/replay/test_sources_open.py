@@ -1,0 +1,188 @@
+"""Which source opens what, and the one clear line for all that none can open."""
+
+from __future__ import annotations
+
+import gzip
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import apsw
+import cv2
+import mcap.exceptions
+import mcap.stream_reader
+import pytest
+import rosbags.rosbag1
+import zstandard
+from ruamel.yaml.error import YAMLError
+
+from replay.errors import BadMessage, InputError
+from replay.sources import SOURCES, open_source
+from replay.sources.boundary import COMMON, translated
+from replay.sources.zstd import ZstdError
+from tests import bags
+from tests.data_paths import ROOT, shared_data
+
+
+def refused(path: Path, *words: str) -> str:
+    """Open a path, or read its maps; return the error, which must be one line that names the path."""
+    with pytest.raises(InputError) as caught, open_source(path) as source:
+        list(source.messages([topic.name for topic in source.info.topics]))
+    text = str(caught.value)
+    assert type(caught.value) is InputError
+    assert str(path) in text
+    assert "\n" not in text
+    for word in words:
+        assert word in text
+    return text
+
+
+def _written(path: Path, content: bytes) -> Path:
+    path.write_bytes(content)
+    return path
+
+
+def test_missing(tmp_path: Path) -> None:
+    refused(tmp_path / "none.bag", "does not exist", "ROS 1 bag")
+
+
+def test_empty_file(tmp_path: Path) -> None:
+    refused(_written(tmp_path / "a.bag", b""), "is empty")
+
+
+def test_folder_that_is_no_bag(tmp_path: Path) -> None:
+    refused(tmp_path, "no ROS 2 bag", "metadata.yaml")
+
+
+def test_folder_of_single_recordings_names_one(tmp_path: Path) -> None:
+    bags.write_rosbag1(tmp_path / "one.bag")
+    refused(tmp_path, str(tmp_path / "one.bag"))
+
+
+def test_file_that_is_no_recording(tmp_path: Path) -> None:
+    refused(_written(tmp_path / "a.mcap", b"hello, world"), "no recording", "hello")
+
+
+@pytest.mark.parametrize(
+    ("content", "hint"),
+    [
+        (gzip.compress(b"x"), "unpack it"),
+        (b"\x28\xb5\x2f\xfd....", "zstd -d"),
+        (b"P5\n2 2\n255\n....", ".yaml"),
+    ],
+)
+def test_file_that_can_be_made_one_says_how(tmp_path: Path, content: bytes, hint: str) -> None:
+    refused(_written(tmp_path / "a.bag", content), hint)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such file")
+def test_what_is_no_file() -> None:
+    refused(Path("/dev/null"), "no regular file")
+
+
+@pytest.mark.parametrize("name", ["a.bag", "folder"])
+def test_permission_denied(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    # By hand, because the owner of a container may read everything.
+    path = tmp_path / name
+    if name == "folder":
+        bags.write_rosbag2(path)
+    else:
+        bags.write_rosbag1(path)
+
+    def denied(self: Path, *_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setattr(Path, "open", denied)
+    refused(path, "permission denied")
+
+
+@pytest.mark.parametrize("head", [b"\x89MCAP0\n", b"\x89MCAP0\r\r\n", b"\xef\xbf\xbdMCAP0\r\n", b"#ROSBAG V2.0\r\n"])
+def test_converted_line_endings_in_the_first_line(tmp_path: Path, head: bytes) -> None:
+    refused(_written(tmp_path / "a", head + bytes(200)), "text mode", "binary mode")
+
+
+def test_shared_bag_with_converted_line_endings() -> None:
+    refused(shared_data("faulty/line_endings_damaged.bag"), "index", "text mode", "binary mode", "rosbag reindex")
+
+
+def test_shared_bag_of_before_2_0() -> None:
+    refused(shared_data("faulty/rosrecord_v1_2.bag"), "#ROSRECORD V1.2", "rosbag fix")
+
+
+@pytest.mark.parametrize("name", ["faulty/no_grid_topic.mcap", "faulty/no_grid_topic_db3"])
+def test_shared_recordings_without_maps_list_their_topics(name: str) -> None:
+    with open_source(shared_data(name)) as source:
+        types = {topic.name: topic.msgtype for topic in source.info.topics}
+        assert types["/tf"] == "tf2_msgs/msg/TFMessage"
+        assert sum(topic.message_count for topic in source.info.topics) > 500
+
+
+# --- the boundary
+
+
+FOREIGN: tuple[Callable[[], Exception], ...] = (
+    lambda: rosbags.rosbag1.ReaderError("File magic is invalid."),
+    lambda: zstandard.ZstdError("bad frame"),
+    lambda: ZstdError("bad frame"),
+    lambda: RuntimeError("LZ4F_decompress failed"),
+    lambda: EOFError("ended"),
+    mcap.exceptions.EndOfFile,
+    lambda: mcap.exceptions.RecordLengthLimitExceeded(5, 1 << 60, 1),
+    lambda: YAMLError("two\nlines"),
+    lambda: cv2.error("too large"),
+    lambda: KeyError("nav_msgs/msg/Odd"),
+    AssertionError,
+    lambda: OSError(5, "Input/output error"),
+    MemoryError,
+    lambda: UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid start byte"),
+)
+
+
+@pytest.mark.parametrize("make", FOREIGN)
+def test_errors_of_libraries_become_one_line(make: Callable[[], Exception]) -> None:
+    error = make()
+    with pytest.raises(InputError) as caught, translated(Path("some/recording"), (*COMMON, type(error))):
+        raise error
+    assert "some/recording" in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert caught.value.__cause__ is error
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), SystemExit(2), GeneratorExit(), apsw.Error("not ours")])
+def test_other_errors_pass(error: BaseException) -> None:
+    with pytest.raises(type(error)), translated(Path("recording")):
+        raise error
+
+
+def test_errors_of_this_program_pass_unchanged() -> None:
+    error = BadMessage("empty", "the map has no cells")
+    with pytest.raises(BadMessage) as caught, translated(Path("recording")):
+        raise error
+    assert caught.value is error
+
+
+# --- the table
+
+
+def test_sources_import_no_library_before_it_is_needed() -> None:
+    code = (
+        "import sys, importlib, replay.sources as s\n"
+        "for target in s.SOURCES.values(): importlib.import_module(target.partition(':')[0])\n"
+        "print(sorted({'rosbags', 'mcap', 'ruamel', 'lz4', 'zstandard', 'apsw'} & set(sys.modules)))"
+    )
+    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"
+
+
+def test_a_new_format_is_one_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = _written(tmp_path / "a.new", b"NEWFORMAT")
+    (tmp_path / "new_format.py").write_text(
+        "class NewFile:\n"
+        "    def __init__(self, path): self.path = path\n"
+        "    @classmethod\n"
+        "    def recognises(cls, path, head): return head.startswith(b'NEWFORMAT')\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(SOURCES, "new", "new_format:NewFile")
+    assert open_source(path).path == path
