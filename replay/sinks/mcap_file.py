@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -38,9 +39,10 @@ from replay.sources.base import GRID_TYPE
 MAP_TOPIC = "/merged/map"
 REPORT_TOPIC = "/merged/report"
 IMAGE_TOPICS = "/merged/images"
-REPORT_SCHEMA = "replay.report"
+REPORT_SCHEMA = "report.schema.json"
 
 _CHUNK_BYTES = 4 << 20
+_NO_SCHEMA = 0
 
 
 class McapSink:
@@ -50,6 +52,7 @@ class McapSink:
         self._options = options
         self._file = PartialFile(path)
         self._robots: tuple[RobotInput, ...] = ()
+        self._parts: dict[str, str] = {}
         self._merged: Grid | None = None
         self._last_map_ns: int | None = None
         self._pending_map: tuple[int, Grid] | None = None
@@ -64,6 +67,7 @@ class McapSink:
             match event:
                 case Started():
                     self._robots = event.robots
+                    self._parts = topic_parts([item.robot for item in event.robots])
                     self._channels.start(f"replay {__version__}")
                     self._channels.metadata("replay.provenance", _provenance(event))
                 case Merged():
@@ -85,7 +89,8 @@ class McapSink:
 
     def discard(self) -> None:
         """Remove the file."""
-        self._stream.close()
+        with suppress(OSError):  # the disk may be full of what is still to be written
+            self._stream.close()
         self._file.discard()
 
     def _tick(self, event: Merged) -> None:
@@ -102,7 +107,7 @@ class McapSink:
 
     def _map(self, stamp_ns: int, merged: Grid | None) -> None:
         """Write the merged map if it changed, at once or, when the last one is too recent, later."""
-        if merged is not None and merged is not self._merged and merged.cells.size:
+        if merged is not None and merged.cells.size and not (self._merged and merged.same_as(self._merged)):
             self._merged = merged
             self._pending_map = (stamp_ns, merged)
         due = self._last_map_ns is None or stamp_ns - self._last_map_ns >= self._options.every_ns
@@ -120,7 +125,7 @@ class McapSink:
         for item in self._robots:
             if item.robot in result.updated:
                 data = encode_grid(result.grids[item.robot], item.frame, stamp_ns)
-                self._channels.ros2(f"/{topic_part(item.robot)}/map", GRID_TYPE, stamp_ns, data, latched=True)
+                self._channels.ros2(f"/{self._parts[item.robot]}/map", GRID_TYPE, stamp_ns, data, latched=True)
 
     def _transforms(self, result: MergeResult) -> list[FrameTransform]:
         return [
@@ -130,7 +135,7 @@ class McapSink:
         ]
 
     def _image(self, item: RobotPicture, stamp_ns: int) -> None:
-        topic = f"{IMAGE_TOPICS}/{topic_part(item.robot)}/{item.picture.step}"
+        topic = f"{IMAGE_TOPICS}/{self._parts[item.robot]}/{item.picture.step}"
         data = encode_image(item.picture.rgb, MERGED_FRAME, stamp_ns)
         self._channels.ros2(topic, IMAGE_TYPE, stamp_ns, data)
 
@@ -183,11 +188,11 @@ class _Channels:
 
     def report(self, stamp_ns: int, report: Report) -> None:
         if REPORT_TOPIC not in self._channels:
-            schema = resources.files("replay").joinpath("schemas/report.schema.json").read_bytes()
-            self._schemas[REPORT_SCHEMA] = self._writer.register_schema(REPORT_SCHEMA, "jsonschema", schema)
-            self._channels[REPORT_TOPIC] = self._writer.register_channel(
-                REPORT_TOPIC, "json", self._schemas[REPORT_SCHEMA]
-            )
+            # Its schema is attached: rosbags opens no file with a channel of a schema that is not of ROS, and Foxglove
+            # reads no channel whose schema has references.
+            schema = resources.files("replay").joinpath(f"schemas/{REPORT_SCHEMA}").read_bytes()
+            self._writer.add_attachment(0, 0, REPORT_SCHEMA, "application/schema+json", schema)
+            self._channels[REPORT_TOPIC] = self._writer.register_channel(REPORT_TOPIC, "json", _NO_SCHEMA)
         self._message(REPORT_TOPIC, stamp_ns, _compact(report).encode())
 
     def _message(self, topic: str, stamp_ns: int, data: bytes) -> None:
@@ -196,10 +201,16 @@ class _Channels:
         self._writer.add_message(self._channels[topic], stamp_ns, data, stamp_ns, sequence)
 
 
-def topic_part(name: str) -> str:
-    """Return a robot's name as a part of a topic: letters, digits, underscores and slashes only."""
-    part = re.sub(r"[^A-Za-z0-9_/]", "_", name).strip("/")
-    return f"_{part}" if part[:1].isdigit() else part
+def topic_parts(robots: Sequence[str]) -> dict[str, str]:
+    """Return each robot's name as a part of topics: letters, digits, underscores and slashes only, no two alike."""
+    parts: dict[str, str] = {}
+    for robot in robots:
+        part = re.sub(r"[^A-Za-z0-9_/]", "_", robot).strip("/")
+        part = f"_{part}" if part[:1].isdigit() else part
+        while part in (MERGED_FRAME, *parts.values()):
+            part += "_"
+        parts[robot] = part
+    return parts
 
 
 def _provenance(event: Started) -> dict[str, str]:

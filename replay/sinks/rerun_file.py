@@ -1,0 +1,140 @@
+"""The recording for the Rerun viewer: everything that happens in a run, to look at."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from uuid import NAMESPACE_URL, UUID, uuid5
+
+import rerun as rr
+
+from mapmerge.config import CellConfig
+from replay.events import Event, Finished, Merged, Report, RobotPicture, Skipped, Started
+from replay.options import NS_PER_S, OutputOptions
+from replay.sinks import rerun_text as text
+from replay.sinks.partial_file import PartialFile, output_errors
+from replay.sinks.rerun_blueprint import Span, blueprint
+from replay.sinks.rerun_entities import ABOUT, DECISIONS, ROBOTS, RobotEntities
+from replay.sinks.rerun_maps import MapScene
+from replay.sinks.rerun_plots import Plots
+from replay.sinks.rerun_stream import RrdStream
+
+_MARKDOWN = rr.MediaType.MARKDOWN
+
+
+class RerunSink:
+    """Writes the maps, pictures, numbers and decisions of a run, and what the viewer shows of them."""
+
+    def __init__(self, path: Path, _options: OutputOptions) -> None:
+        self._file = PartialFile(path)
+        self._writer: _Writer | None = None
+        with output_errors(path):
+            self._file.partial.touch()
+
+    def take(self, event: Event) -> None:
+        """Log what happened; it is in the file when this returns."""
+        with output_errors(self._file.path, RuntimeError):
+            if isinstance(event, Started):
+                self._writer = _Writer(self._file.partial, event)
+            elif self._writer is not None:
+                self._writer.take(event)
+
+    def finish(self) -> None:
+        """Make the file whole."""
+        with output_errors(self._file.path, RuntimeError):
+            if self._writer is not None:
+                self._writer.finish()
+
+    def publish(self) -> None:
+        """Give the recording its final name."""
+        self._file.publish()
+
+    def discard(self) -> None:
+        """Remove the recording."""
+        if self._writer is not None:
+            self._writer.stream.close()
+        self._file.discard()
+
+
+class _Writer:
+    """Logs a run whose robots are known."""
+
+    def __init__(self, path: Path, started: Started) -> None:
+        merge = started.settings["merge"]
+        robots = [RobotEntities(item.robot, index) for index, item in enumerate(started.robots)]
+        self.stream = RrdStream(path, _recording_id(started))
+        self._robots = {entities.robot: entities for entities in robots}
+        self._maps = MapScene(self.stream, robots, CellConfig(**merge["cells"]))
+        self._plots = Plots(self.stream, robots, merge["verify"]["min_acceptance"])
+        self._steps: dict[str, list[str]] = {}
+        self._skipped: list[Skipped] = []
+        self._table = ""
+        self._span: Span | None = None
+
+    def take(self, event: Event) -> None:
+        """Log an event."""
+        match event:
+            case Skipped():
+                # A message is skipped before its tick is there, and only that has the time of the recording.
+                self._skipped.append(event)
+            case Merged():
+                self._take_merged(event)
+            case Finished():
+                self._take_finished(event)
+
+    def finish(self) -> None:
+        """Write the layout of the viewer and all that makes the file whole."""
+        self.stream.send(blueprint(list(self._robots.values()), self._steps, self._maps.extent, self._span))
+        self.stream.finish()
+
+    def _take_merged(self, event: Merged) -> None:
+        self.stream.at(event.stamp_ns)
+        self._span = (self._span[0] if self._span else event.stamp_ns, event.stamp_ns)
+        self._maps.show(event.result)
+        for item in event.pictures:
+            self._show_picture(item)
+        self._plots.show(event.report, event.timing)
+        self._show_skipped()
+        for entry in text.decisions(event.result):
+            self._say(entry)
+        self._show_table(event.report)
+        self.stream.flush()
+
+    def _take_finished(self, event: Finished) -> None:
+        self._show_skipped()
+        for entry in text.outcome(event.report):
+            self._say(entry)
+        self._show_table(event.report)
+        self.stream.log(ABOUT, rr.TextDocument(text.about(event.report), media_type=_MARKDOWN), static=True)
+
+    def _show_picture(self, item: RobotPicture) -> None:
+        steps = self._steps.setdefault(item.robot, [])
+        if item.picture.step not in steps:
+            steps.append(item.picture.step)
+        self.stream.log([*self._robots[item.robot].evidence, item.picture.step], rr.Image(item.picture.rgb))
+
+    def _show_table(self, report: Report) -> None:
+        table = text.robots_table(report)
+        if table != self._table:
+            self._table = table
+            self.stream.log(ROBOTS, rr.TextDocument(table, media_type=_MARKDOWN), static=self._span is None)
+
+    def _show_skipped(self) -> None:
+        for event in self._skipped:
+            self._say(text.skipped(event))
+        self._skipped.clear()
+
+    def _say(self, entry: text.Entry) -> None:
+        level, words = entry
+        if self._span is None:
+            self.stream.log(DECISIONS, rr.TextLog(words, level=level), static=True)
+            return
+        since_s = (self._span[1] - self._span[0]) / NS_PER_S
+        self.stream.log(DECISIONS, rr.TextLog(f"+{since_s:.1f} s  {words}", level=level))
+
+
+def _recording_id(started: Started) -> UUID:
+    """Return an id that is the same for the same input and settings."""
+    said = [[asdict(item) for item in started.robots], started.settings, [dict(item) for item in started.inputs]]
+    return uuid5(NAMESPACE_URL, json.dumps(said, sort_keys=True, default=str))

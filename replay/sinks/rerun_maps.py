@@ -1,0 +1,213 @@
+"""Maps in the Rerun recording: the merged one, and each robot's own under its frame. Only what changed is logged."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+
+from mapmerge.config import CellConfig
+from mapmerge.grid import Grid
+from mapmerge.merger import MergeResult, RobotOutcome, Status
+from mapmerge.prepare import thinned
+from mapmerge.resample import at_resolution
+from mapmerge.sim2 import Points, Sim2
+from replay.sinks.rerun_entities import MERGED, MERGED_MAP, EntityPath, RobotEntities
+from replay.sinks.rerun_layout import Box, Layout, PointM, lay_out
+from replay.sinks.rerun_stream import RrdStream
+
+# A texture of a graphics card has at most so many pixels on a side; larger maps are shown coarser.
+MAX_SIDE_CELLS = 8192
+_POINTS_ACROSS = 2000
+
+# Heights in metres above the merged map, of which what lies on it is seen from above.
+_OUTLINE_Z_M = 0.02
+_WALLS_Z_M = 0.04
+_LABEL_Z_M = 0.5
+_STEP_Z_M = 0.005
+
+# Sizes in points of the screen, which the library tells from metres by their sign.
+_REFERENCE_WALL_RADIUS = rr.Radius.ui_points(1.4)
+_WALL_RADIUS = rr.Radius.ui_points(0.75)
+_OUTLINE_RADIUS = rr.Radius.ui_points(0.75)
+
+_LABEL_WIDTH = 34
+
+
+@dataclass(slots=True)
+class _Shown:
+    """What the recording shows of one robot now."""
+
+    corners_m: Points | None = None
+    pose: Sim2 | None = None
+    label: tuple[str, PointM] | None = None
+
+
+class MapScene:
+    """Logs the maps of a run.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    robots
+        The robots, the reference first.
+    cells
+        When a cell counts as occupied.
+    """
+
+    def __init__(self, stream: RrdStream, robots: Sequence[RobotEntities], cells: CellConfig) -> None:
+        self._stream = stream
+        self._robots = robots
+        self._cells = cells
+        self._merged: Grid | None = None
+        self._shown = {entities.robot: _Shown() for entities in robots}
+        self._extent: Box | None = None
+        stream.log(MERGED, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+
+    @property
+    def extent(self) -> Box | None:
+        """What all maps cover now; None without maps."""
+        return self._extent
+
+    def show(self, result: MergeResult) -> None:
+        """Log what differs from what was logged before."""
+        self._show_merged(result.merged)
+        for entities in self._robots:
+            if entities.robot in result.updated:
+                self._show_map(entities, result.grids[entities.robot])
+        corners_m = {robot: shown.corners_m for robot, shown in self._shown.items() if shown.corners_m is not None}
+        layout = lay_out(result, corners_m)
+        self._extent = layout.extent
+        for entities in self._robots:
+            self._show_pose(entities, layout)
+            self._show_label(entities, result.robots[entities.robot], layout)
+
+    def _show_merged(self, merged: Grid | None) -> None:
+        if merged is None or merged is self._merged:
+            return
+        if self._merged is None or not merged.same_as(self._merged):
+            self._log_grid(MERGED_MAP, merged, draw_order=1.0)
+        self._merged = merged
+
+    def _show_map(self, entities: RobotEntities, grid: Grid) -> None:
+        """Log a robot's own map, cropped to what it knows, so that it lies within the merged map once it is placed."""
+        known = grid.cropped_to_known()
+        shown = self._shown[entities.robot]
+        self._log_grid(entities.map, known, draw_order=0.0)
+        if known.cells.size == 0:
+            shown.corners_m = None
+            for path in (entities.walls, entities.outline):
+                self._stream.log(path, rr.Clear(recursive=False))
+            return
+        shown.corners_m = _corners_m(known)
+        self._log_walls(entities, known)
+        self._stream.log(
+            entities.outline,
+            rr.LineStrips3D(
+                [_raised(np.vstack([shown.corners_m, shown.corners_m[:1]]), _OUTLINE_Z_M)],
+                radii=_OUTLINE_RADIUS,
+                colors=[entities.colour],
+            ),
+        )
+
+    def _log_walls(self, entities: RobotEntities, known: Grid) -> None:
+        walls_m = known.centres_m(known.cells >= self._cells.min_occupied_percent)
+        spacing_m = max(known.rows, known.cols) * known.resolution_m / _POINTS_ACROSS
+        if spacing_m > known.resolution_m:
+            walls_m = thinned(walls_m, spacing_m)
+        height_m = _WALLS_Z_M + _STEP_Z_M * entities.index
+        # The reference's walls are drawn wide, so that those of the others are seen on them.
+        radius = _WALL_RADIUS if entities.index else _REFERENCE_WALL_RADIUS
+        self._stream.log(
+            entities.walls,
+            rr.Points3D(
+                _raised(walls_m, height_m),
+                radii=radius,
+                colors=[entities.colour],
+                point_shading=rr.components.PointShading.Flat,
+            ),
+        )
+
+    def _log_grid(self, path: EntityPath, grid: Grid, *, draw_order: float) -> None:
+        if grid.cells.size == 0:
+            self._stream.log(path, rr.Clear(recursive=False))
+            return
+        factor = math.ceil(max(grid.rows, grid.cols) / MAX_SIDE_CELLS)
+        shown = at_resolution(grid, grid.resolution_m * factor, self._cells)
+        pose = shown.map_from_grid
+        self._stream.log(
+            path,
+            rr.GridMap(
+                # Row 0 has the lowest y in a map, and is the top one in a picture.
+                data=shown.cells[::-1].tobytes(),
+                format=rr.components.ImageFormat(
+                    width=shown.cols, height=shown.rows, color_model="L", channel_datatype="U8"
+                ),
+                cell_size=shown.resolution_m,
+                translation=[pose.x_m, pose.y_m, 0.0],
+                quaternion=_quaternion(pose.yaw_rad),
+                draw_order=draw_order,
+                colormap=rr.components.Colormap.RvizMap,
+            ),
+        )
+
+    def _show_pose(self, entities: RobotEntities, layout: Layout) -> None:
+        pose, shown = layout.merged_from_map.get(entities.robot), self._shown[entities.robot]
+        if pose is None or pose == shown.pose:
+            return
+        shown.pose = pose
+        self._stream.log(
+            entities.frame,
+            rr.Transform3D(
+                translation=[pose.x_m, pose.y_m, 0.0], quaternion=_quaternion(pose.yaw_rad), scale=[pose.scale] * 3
+            ),
+        )
+
+    def _show_label(self, entities: RobotEntities, outcome: RobotOutcome, layout: Layout) -> None:
+        at_m, shown = layout.labels_m.get(entities.robot), self._shown[entities.robot]
+        if at_m is None:
+            if shown.label is not None:
+                shown.label = None
+                self._stream.log(entities.label, rr.Clear(recursive=False))
+            return
+        text = _label(entities.robot, outcome)
+        if shown.label == (text, at_m):
+            return
+        shown.label = (text, at_m)
+        self._stream.log(
+            entities.label,
+            rr.Points3D(
+                [[*at_m, _LABEL_Z_M]],
+                labels=[text],
+                show_labels=True,
+                colors=[entities.text_colour],
+                radii=_OUTLINE_RADIUS,
+            ),
+        )
+
+
+def _label(robot: str, outcome: RobotOutcome) -> str:
+    if outcome.merged_from_map is not None:
+        return f"{robot} (reference)" if outcome.status is Status.REFERENCE else robot
+    lines = textwrap.wrap(outcome.reason.message, _LABEL_WIDTH)
+    return "\n".join([f"{robot} is not merged:", *lines])
+
+
+def _corners_m(grid: Grid) -> Points:
+    """Return the corners of a grid in the map frame, counter-clockwise from that of cell (0, 0)."""
+    width_m, height_m = grid.cols * grid.resolution_m, grid.rows * grid.resolution_m
+    return grid.map_from_grid.apply(np.array([[0.0, 0.0], [width_m, 0.0], [width_m, height_m], [0.0, height_m]]))
+
+
+def _raised(points_m: Points, height_m: float) -> Points:
+    """Return points of the plane at a height above it."""
+    return np.column_stack([points_m, np.full(len(points_m), height_m)])
+
+
+def _quaternion(yaw_rad: float) -> rr.Quaternion:
+    return rr.Quaternion(xyzw=[0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2)])

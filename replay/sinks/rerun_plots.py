@@ -1,0 +1,93 @@
+"""Numbers over time in the Rerun recording: how well each robot's map agrees with the others, and what it cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import rerun as rr
+
+from replay.events import Report, Timing
+from replay.sinks.rerun_entities import LIMIT_COLOUR, PLOTS, EntityPath, RobotEntities
+from replay.sinks.rerun_stream import RrdStream
+
+QUANTITIES = ("acceptance", "overlap_m2", "overlap_fraction")
+"""Values of each robot in the report that are plotted."""
+STEP_TIME = "step_ms"
+TITLES: Mapping[str, str] = {
+    "acceptance": "Acceptance index",
+    "overlap_m2": "Overlap, m²",
+    "overlap_fraction": "Overlap, share",
+    STEP_TIME: "Wall time per step, ms",
+}
+
+_LIMIT: EntityPath = [*PLOTS, "acceptance", "limit"]
+_REFERENCE_WIDTH = 4.0
+_WIDTH = 2.0
+_STEPS: tuple[tuple[str, tuple[int, int, int]], ...] = (("merge", (36, 113, 204)), ("render", (240, 120, 10)))
+
+
+class Plots:
+    """Logs a run's numbers.
+
+    A robot that is not placed has the values of its best refused candidate. These are points rather than a line, on
+    entities of their own, so that nobody takes them for the quality of a merged map.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    robots
+        The robots, the reference first.
+    min_acceptance
+        Least acceptance index of a placement.
+    """
+
+    def __init__(self, stream: RrdStream, robots: Sequence[RobotEntities], min_acceptance: float) -> None:
+        self._stream = stream
+        self._robots = robots
+        self._min_acceptance = min_acceptance
+        self._drawn: set[tuple[str, str]] = set()
+        for entities in robots:
+            for quantity in QUANTITIES:
+                self._style(entities, quantity)
+        limit = rr.SeriesLines(colors=[LIMIT_COLOUR], widths=[1.0], names=["least accepted"])
+        stream.log(_LIMIT, limit, static=True)
+        for name, colour in _STEPS:
+            style = rr.SeriesLines(colors=[colour], widths=[_WIDTH], names=[name])
+            stream.log([*PLOTS, STEP_TIME, name], style, static=True)
+
+    def show(self, report: Report, timing: Timing) -> None:
+        """Log the values of one tick."""
+        for entities in self._robots:
+            values = report["robots"][entities.robot]
+            for quantity in QUANTITIES:
+                self._show_value(entities, quantity, values)
+        self._stream.log(_LIMIT, rr.Scalars(self._min_acceptance))
+        for (name, _), seconds in zip(_STEPS, (timing.merge_s, timing.render_s), strict=True):
+            self._stream.log([*PLOTS, STEP_TIME, name], rr.Scalars(seconds * 1000.0))
+
+    def _style(self, entities: RobotEntities, quantity: str) -> None:
+        # The reference agrees with the others as they do with it: its line is wide, so that theirs are seen on it.
+        width = _WIDTH if entities.index else _REFERENCE_WIDTH
+        line = rr.SeriesLines(
+            colors=[entities.colour], widths=[width], names=[entities.robot], interpolation_mode="StepAfter"
+        )
+        self._stream.log(entities.plot(quantity, placed=True), line, static=True)
+        points = rr.SeriesPoints(
+            colors=[entities.colour], markers=["cross"], marker_sizes=[4.0], names=[f"{entities.robot}, refused"]
+        )
+        self._stream.log(entities.plot(quantity, placed=False), points, static=True)
+
+    def _show_value(self, entities: RobotEntities, quantity: str, values: Mapping[str, Any]) -> None:
+        value, placed = values[quantity], values["merged_from_map"] is not None
+        line = (entities.robot, quantity)
+        if value is not None:
+            self._stream.log(entities.plot(quantity, placed=placed), rr.Scalars(value))
+        if placed and value is not None:
+            self._drawn.add(line)
+        elif line in self._drawn:
+            # A gap, without which the line would go on to where the robot is placed again.
+            self._drawn.remove(line)
+            self._stream.log(entities.plot(quantity, placed=True), rr.Scalars(math.nan))

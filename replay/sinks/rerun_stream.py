@@ -1,0 +1,125 @@
+"""The Rerun library's file writer: data in at times of the recording, one file out, errors as they should be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import timedelta
+from pathlib import Path
+from threading import Thread
+from uuid import UUID
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from rerun.chunk import RrdReader
+
+APPLICATION = "replay"
+TIMELINE = "log_time"
+"""Time of the recording."""
+TICKS = "tick"
+"""Number of the time, from 0: to step from one to the next, and to compare two files by, since ``rerun rrd compare``
+leaves out whatever is called log_time."""
+
+_PATIENCE_S = 3.0
+_NEVER = timedelta(days=365)
+_NO_LIMIT = 1 << 40
+
+
+class RrdStream:
+    """Writes one recording and its blueprint to a file.
+
+    Nothing that is written depends on the clock of the machine: the timelines are the recording's own.
+
+    Parameters
+    ----------
+    path
+        The file.
+    recording_id
+        The same for the same input, so that two runs can be compared.
+
+    Raises
+    ------
+    RuntimeError
+        If the file cannot be opened.
+    """
+
+    def __init__(self, path: Path, recording_id: UUID) -> None:
+        self._path = path
+        # Rows go to chunks when `flush` says so and never by the clock, so that two runs have the same chunks.
+        batching = rr.ChunkBatcherConfig(_NEVER, _NO_LIMIT, _NO_LIMIT)
+        self._recording = rr.RecordingStream(
+            APPLICATION, recording_id=recording_id, send_properties=False, batcher_config=batching
+        )
+        self._recording.set_log_time_enabled(False)
+        self._recording.set_log_tick_enabled(False)
+        self._recording.save(path)
+        self._ticks = 0
+        self._broken = False
+
+    def at(self, stamp_ns: int) -> None:
+        """Set the time of what is logged from now on."""
+        self._recording.set_time(TIMELINE, timestamp=np.datetime64(stamp_ns, "ns"))
+        self._recording.set_time(TICKS, sequence=self._ticks)
+        self._ticks += 1
+
+    def log(self, path: Sequence[str], *content: rr.AsComponents, static: bool = False) -> None:
+        """Log to an entity, whose path is given in parts that need no escaping."""
+        self._recording.log(list(path), *content, static=static)
+
+    def send(self, blueprint: rrb.Blueprint) -> None:
+        """Add what the viewer shows when the file is opened."""
+        self._recording.send_blueprint(blueprint, make_active=True, make_default=True)
+
+    def flush(self) -> None:
+        """Wait until all that was logged is in the file.
+
+        Raises
+        ------
+        RuntimeError
+            If it does not get there.
+        """
+        # The library's writer is a thread. When it fails, on a full disk say, whatever waits for it waits for ever:
+        # so wait only while the file grows.
+        size = self._path.stat().st_size
+        while True:
+            try:
+                self._recording.flush(timeout_sec=_PATIENCE_S)
+            except RuntimeError as error:
+                grown = self._path.stat().st_size
+                if grown > size:
+                    size = grown
+                    continue
+                self._abandon()
+                raise _not_written(error) from error
+            return
+
+    def finish(self) -> None:
+        """Make the file whole and release it.
+
+        Raises
+        ------
+        RuntimeError
+            If not all of it could be written.
+        """
+        self.flush()
+        self.close()
+        try:
+            # The library tells nobody when it fails to write the end of the file; without that this raises.
+            RrdReader(self._path).store()
+        except RuntimeError as error:
+            raise _not_written(error) from error
+
+    def close(self) -> None:
+        """Release the file as it is; harmless at any time."""
+        if not self._broken:
+            self._recording.disconnect()
+
+    def _abandon(self) -> None:
+        """Let go of a recording whose writer has failed: closing it and ending the process could both hang."""
+        self._broken = True
+        rr.unregister_shutdown()
+        Thread(target=self._recording.disconnect, daemon=True).start()
+
+
+def _not_written(error: Exception) -> RuntimeError:
+    return RuntimeError(f"{error}; is the disk full?")

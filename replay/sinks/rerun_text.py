@@ -1,0 +1,91 @@
+"""Words in the Rerun recording: what is said of changes, of the robots, and of the run."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from mapmerge.merger import Change, ChangeKind, MergeResult
+from mapmerge.sim2 import Sim2
+from replay.events import Report, Skipped
+
+INFO, WARN = "INFO", "WARN"
+Entry = tuple[str, str]
+"""Level and text of an entry of the log."""
+
+_COLUMNS = ("robot", "status", "x, m", "y, m", "yaw, °", "acceptance", "overlap, m²", "reason")
+
+
+def decisions(result: MergeResult) -> Iterator[Entry]:
+    """Say what was placed, moved or withdrawn in a step."""
+    for change in result.changes:
+        yield _decision(change, result.robots[change.robot].merged_from_map)
+
+
+def skipped(event: Skipped) -> Entry:
+    """Say which message was not used, and why."""
+    return WARN, f"{event.robot}: a message of {event.topic} was skipped: {event.detail}"
+
+
+def outcome(report: Report) -> Iterator[Entry]:
+    """Say what became of the robots in the end."""
+    robots = report["robots"]
+    merged = sum(values["merged_from_map"] is not None for values in robots.values())
+    yield (INFO if merged == len(robots) else WARN), f"end: {merged} of {len(robots)} robots are in the merged map"
+    for robot, values in robots.items():
+        if values["merged_from_map"] is None:
+            yield WARN, f"{robot} is not merged: {values['reason']['message']}"
+
+
+def robots_table(report: Report) -> str:
+    """Return the robots as a table in Markdown."""
+    rows = [_COLUMNS, ("---",) * len(_COLUMNS)]
+    rows += [_row(robot, values) for robot, values in report["robots"].items()]
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+
+def about(report: Report) -> str:
+    """Return inputs and settings in Markdown."""
+    parts = [f"# replay {report['version']}", f"Reference: **{report['reference']}**", "## Inputs"]
+    parts += [_block(item) for item in report["inputs"]]
+    parts += ["## Settings", _block(report["settings"])]
+    return "\n\n".join(parts) + "\n"
+
+
+def _decision(change: Change, pose: Sim2 | None) -> Entry:
+    if change.kind is ChangeKind.WITHDRAWN or pose is None:
+        return WARN, f"{change.robot} is withdrawn: {change.reason.message}"
+    at = f"x {pose.x_m:.2f} m, y {pose.y_m:.2f} m, yaw {math.degrees(pose.yaw_rad):.1f}°"
+    if change.kind is ChangeKind.MOVED:
+        return INFO, f"{change.robot} moved to {at}: {change.reason.message}"
+    return INFO, f"{change.robot} {change.reason.message}; at {at}"
+
+
+def _row(robot: str, values: Mapping[str, Any]) -> tuple[str, ...]:
+    pose = values["merged_from_map"] or {}
+    yaw_rad = pose.get("yaw_rad")
+    return (
+        _plain(robot),
+        _plain(values["status"]),
+        _number(pose.get("x_m"), 2),
+        _number(pose.get("y_m"), 2),
+        _number(None if yaw_rad is None else math.degrees(yaw_rad), 1),
+        _number(values["acceptance"], 3),
+        _number(values["overlap_m2"], 1),
+        _plain(values["reason"]["message"]),
+    )
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"
+
+
+def _plain(text: str) -> str:
+    """Return text that stays in its cell."""
+    return text.replace("|", "\\|").replace("_", "\\_").replace("\n", " ")
+
+
+def _block(value: Any) -> str:  # noqa: ANN401 - any JSON value
+    return f"```json\n{json.dumps(value, indent=2, ensure_ascii=False)}\n```"

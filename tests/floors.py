@@ -1,0 +1,213 @@
+"""Maps to test with: simulated runs with known truth, and maps drawn from rectangles."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapmerge.config import MergeConfig
+from mapmerge.grid import Grid
+from mapmerge.match import Match, Matcher
+from mapmerge.prepare import PreparedMap, prepare
+from mapmerge.sim2 import IDENTITY, Sim2, wrap_angle
+from samples.drive import Pace, follow, route, stops, survey, tour, window
+from samples.floorplan import FloorStyle, look_alike_corridor, office_floor
+from samples.lidar import Lidar
+from samples.mapping import SensorModel
+from samples.mission import Robot, Run, explore, known_at
+
+UNKNOWN, FREE, WALL = -1, 0, 100
+CONFIG = MergeConfig()
+SMALL = FloorStyle(width_m=17.0, height_m=11.5)
+BAYS, BAY_M = 7, 4.0
+
+
+# Simulated runs
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two maps of one floor, and where the source's map frame truly lies in the target's."""
+
+    target: Grid
+    source: Grid
+    target_from_source: Sim2
+
+    @property
+    def swapped(self) -> Pair:
+        return Pair(self.source, self.target, self.target_from_source.inverse())
+
+    @property
+    def shared_m(self) -> tuple[float, float]:
+        """Middle of what both maps know, in the source's map frame: where a position error is measured."""
+        centres_m = self.source.centres_m(self.source.known)
+        both = known_at(self.target, self.target_from_source.apply(centres_m))
+        x_m, y_m = centres_m[both].mean(axis=0)
+        return float(x_m), float(y_m)
+
+    def errors(self, target_from_source: Sim2) -> tuple[float, float]:
+        """Return a placement's error in metres, amid the overlap, and in degrees."""
+        return errors(target_from_source, self.target_from_source, self.shared_m)
+
+
+@functools.cache
+def office_run(
+    seed: int, lo: float, hi: float, heading_rad: float, noise: int, resolution_m: float = 0.05, maps: int = 3
+) -> Run:
+    """Return a robot's run through a strip of a small office floor; ``noise`` seeds the robot's own errors."""
+    world = office_floor(seed, SMALL)
+    places = window(stops(world, survey(world)), lo, hi, direction_rad=0.2)
+    return _run(world, places, heading_rad, noise, resolution_m, maps)
+
+
+@functools.cache
+def corridor_run(first_bay: int, last_bay: int, heading_rad: float, noise: int) -> Run:
+    """Return a run past some bays of a corridor whose rooms nobody can tell apart; its ends are not seen."""
+    world = look_alike_corridor(BAYS, BAY_M)
+    lo_m, hi_m = first_bay * BAY_M, (last_bay + 1) * BAY_M
+    everywhere = stops(world, survey(world))
+    places = [stop for stop in everywhere if lo_m < stop.x_m < hi_m and stop.room != 0]
+    return _run(world, places, heading_rad, noise, 0.05, 2, max_range_m=3.5)
+
+
+def _run(world, places, heading_rad, noise, resolution_m, maps, max_range_m=8.0):
+    terrain = survey(world)
+    pace = Pace(speed_m_s=1.0, turn_rad_s=1.8)
+    poses = follow(route(terrain, tour(world, places)), heading_rad, pace)
+    lidar = Lidar(beams_per_turn=360, max_range_m=max_range_m)
+    robot = Robot(lidar=lidar, pace=pace, model=SensorModel(resolution_m=resolution_m))
+    return explore(world, poses, robot, maps, np.random.default_rng([noise, 5]))
+
+
+def last_map(run: Run) -> Grid:
+    return run.snapshots[-1].grid
+
+
+def pair_of(target: Run, source: Run) -> Pair:
+    return Pair(last_map(target), last_map(source), target.world_from_map.inverse() @ source.world_from_map)
+
+
+def office_pair(seed: int, *, resolutions_m=(0.05, 0.05), headings_rad=(0.4, 1.9)) -> Pair:
+    """Return the maps of two robots that start at opposite sides of one floor."""
+    return pair_of(
+        office_run(seed, 0.0, 0.7, headings_rad[0], 1, resolutions_m[0]),
+        office_run(seed, 1.0, 0.3, headings_rad[1], 2, resolutions_m[1]),
+    )
+
+
+def in_frame(grid: Grid, new_from_map: Sim2) -> Grid:
+    """Return the same cells in another map frame: the origin shifts and turns."""
+    return Grid(grid.cells, grid.resolution_m, new_from_map @ grid.map_from_grid)
+
+
+# Drawn maps
+
+Box = tuple[float, float, float, float]
+
+
+def drawn(
+    inside: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    walls: Sequence[Box],
+    *,
+    size_m: tuple[float, float],
+    resolution_m: float = 0.05,
+    floor_from_map: Sim2 = IDENTITY,
+    ragged: int | None = None,
+) -> Grid:
+    """Return a map of what is drawn in the frame of a floor.
+
+    Parameters
+    ----------
+    inside
+        Tells for x and y where the floor is known; elsewhere the map is unknown.
+    walls
+        Rectangles x0, y0, x1, y1.
+    size_m
+        The map's sides; its grid begins at its frame's origin.
+    floor_from_map
+        Where the map's frame lies on the floor.
+    ragged
+        Seed of a noise that moves the cells' centres by up to half a cell; None for none.
+    """
+    rows, cols = round(size_m[1] / resolution_m), round(size_m[0] / resolution_m)
+    row, col = np.indices((rows, cols)).reshape(2, -1)
+    centres = np.stack([col + 0.5, row + 0.5], axis=1)
+    if ragged is not None:
+        centres += np.random.default_rng(ragged).uniform(-0.5, 0.5, centres.shape)
+    x_m, y_m = floor_from_map.apply(centres * resolution_m).T
+    cells = np.where(inside(x_m, y_m), FREE, UNKNOWN)
+    for x0_m, y0_m, x1_m, y1_m in walls:
+        cells[(x_m >= x0_m) & (x_m < x1_m) & (y_m >= y0_m) & (y_m < y1_m)] = WALL
+    return Grid(cells.reshape(rows, cols).astype(np.int8), resolution_m)
+
+
+def within(x0_m: float, y0_m: float, x1_m: float, y1_m: float) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    return lambda x_m, y_m: (x_m >= x0_m) & (x_m < x1_m) & (y_m >= y0_m) & (y_m < y1_m)
+
+
+def outline(x0_m: float, y0_m: float, x1_m: float, y1_m: float, thick_m: float = 0.1) -> list[Box]:
+    """Return the four walls around a rectangle, outside of it."""
+    low_x, low_y, high_x, high_y = x0_m - thick_m, y0_m - thick_m, x1_m + thick_m, y1_m + thick_m
+    return [
+        (low_x, low_y, high_x, y0_m),
+        (low_x, y1_m, high_x, high_y),
+        (low_x, low_y, x0_m, high_y),
+        (x1_m, low_y, high_x, high_y),
+    ]
+
+
+FLAT_M = (9.0, 6.0)
+FLAT_WALLS = [
+    *outline(0.0, 0.0, *FLAT_M),
+    (3.5, 0.0, 3.6, 2.2),
+    (3.5, 3.1, 3.6, 6.0),
+    (3.6, 3.8, 7.4, 3.9),
+    (6.2, 0.0, 6.3, 1.3),
+    (0.0, 4.4, 1.2, 4.5),
+    (7.8, 1.7, 8.5, 2.5),
+    (4.3, 5.2, 5.0, 5.5),
+]
+
+
+def flat(
+    floor_from_map: Sim2 = Sim2(-1.0, -1.0), *, resolution_m: float = 0.05, ragged: int | None = None, size_m: float = 11.0
+) -> Grid:
+    """Return a drawn flat of 9 × 6 m without any symmetry."""
+    return drawn(
+        within(0.0, 0.0, *FLAT_M),
+        FLAT_WALLS,
+        size_m=(size_m, size_m - 3.0),
+        resolution_m=resolution_m,
+        floor_from_map=floor_from_map,
+        ragged=ragged,
+    )
+
+
+def filled(value: int, rows: int, cols: int, resolution_m: float = 0.05) -> Grid:
+    return Grid(np.full((rows, cols), value, np.int8), resolution_m)
+
+
+# Measures
+
+
+def errors(found: Sim2, true: Sim2, at_m: tuple[float, float]) -> tuple[float, float]:
+    """Return how far two placements are apart at a point of the source, in metres and degrees."""
+    x_m, y_m = found.apply_point(*at_m)
+    true_x_m, true_y_m = true.apply_point(*at_m)
+    turn_rad = wrap_angle(found.yaw_rad - true.yaw_rad)
+    return math.hypot(x_m - true_x_m, y_m - true_y_m), abs(math.degrees(turn_rad))
+
+
+def match_grids(matcher: Matcher, target: Grid, source: Grid, config: MergeConfig = CONFIG) -> Match:
+    """Match two maps at the resolution that the merger would take."""
+    resolution_m = max(config.search.working_cell_m, target.resolution_m, source.resolution_m)
+    prepared = [matcher.prepare(grid, resolution_m, config) for grid in (target, source)]
+    return matcher.match(*prepared, config)
+
+
+def prepared_map(grid: Grid, config: MergeConfig = CONFIG) -> PreparedMap:
+    return prepare(grid, max(config.search.working_cell_m, grid.resolution_m), config)

@@ -1,0 +1,463 @@
+"""What the Rerun recording holds, read back with Rerun's own reader, and that the viewer can show it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from mapmerge.grid import Grid
+from mapmerge.merger import MergeState, Status, step
+from mapmerge.sim2 import IDENTITY, Sim2
+from replay.errors import OutputError
+from replay.events import Event, Finished, Merged, RobotInput, SkipCause, Skipped, Started, Timing
+from replay.gallery import Gallery
+from replay.options import OutputOptions, RunOptions
+from replay.report import ReportBuilder
+from replay.sinks.rerun_file import RerunSink
+from replay.sinks.rerun_layout import Box, lay_out
+from replay.sinks.rerun_maps import MAX_SIDE_CELLS
+from replay.sinks.rerun_stream import RrdStream
+from tests.floors import filled
+from tests.runs import bare_room, flat_map, reference_from
+
+ROBOTS = ("r1", "r2", "odd one/ü.3", "r4")
+STRANGER = "odd one/ü.3"
+STRANGER_PATH = rr.escape_entity_path_part(STRANGER)
+STAMPS = tuple(1_700_000_000_000_000_001 + index * 1_234_567_891 for index in range(6))
+OPTIONS = RunOptions(runs=())
+
+
+@pytest.fixture(autouse=True)
+def strict() -> Iterator[None]:
+    """Let the library raise where it would only warn."""
+    rr.set_strict_mode(True)
+    yield
+    rr.set_strict_mode(False)
+
+
+def events_of(
+    robots: Sequence[str], ticks: Mapping[int, Mapping[str, Grid]], skipped: Mapping[int, Skipped] | None = None
+) -> list[Event]:
+    """Return what a run with these maps would yield, as `replay.pipeline.run` does."""
+    inputs = tuple(RobotInput(robot, f"/{robot}/map", f"{robot}/map", "header", (0,), 9) for robot in robots)
+    settings = OPTIONS.settings()
+    report, gallery, state = ReportBuilder(inputs, settings, "9.9"), Gallery("changed"), MergeState.initial(robots)
+    found: list[Event] = [Started(inputs, settings, ({"name": "run.mcap"},))]
+    for stamp_ns, grids in ticks.items():
+        if skipped and stamp_ns in skipped:
+            found.append(skipped[stamp_ns])
+        state, result = step(state, grids, OPTIONS.merge)
+        report.take(stamp_ns, result)
+        written = report.build(stamp_ns, result, ({"name": "run.mcap"},))
+        found.append(Merged(stamp_ns, result, written, gallery.due(result), Timing(0.1, 0.2), 1, 9))
+    last_ns = max(ticks, default=None)
+    return [*found, Finished(report.build(last_ns, state.result, ({"name": "run.mcap", "sha256": "ab"},)))]
+
+
+@pytest.fixture(scope="module")
+def story() -> list[Event]:
+    """A stranger beside two robots of which one is placed, withdrawn and placed again; a fourth says nothing."""
+    ticks = {
+        STAMPS[0]: {"r2": flat_map("r2", 4.5)},
+        STAMPS[1]: {"r1": flat_map("r1"), STRANGER: bare_room()},
+        STAMPS[2]: {"r2": flat_map("r2")},
+        STAMPS[3]: {"r2": flat_map("r2")},
+        STAMPS[4]: {"r2": bare_room()},
+        STAMPS[5]: {"r2": flat_map("r2")},
+    }
+    cause = Skipped("r4", "/r4/map", 12, SkipCause.EMPTY, "it has 0 × 0 cells")
+    return events_of(ROBOTS, ticks, {STAMPS[2]: cause})
+
+
+def written(path: Path, events: Sequence[Event]) -> Path:
+    sink = RerunSink(path, OutputOptions(path.with_suffix(".mcap")))
+    for event in events:
+        sink.take(event)
+    sink.finish()
+    sink.publish()
+    return path
+
+
+@pytest.fixture(scope="module")
+def recording(story: list[Event], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written(tmp_path_factory.mktemp("rrd") / "run.rrd", story)
+
+
+class Entity:
+    """All rows of one entity that have a time; if none has, those without."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        batches = [chunk.to_record_batch() for chunk in RrdReader(path).stream() if chunk.entity_path == name]
+        assert batches, name
+        rows = [row for batch in batches for row in _rows(batch)]
+        timed = [row for row in rows if "log_time" in row]
+        self.rows = sorted(timed, key=lambda row: row["log_time"]) if timed else rows
+
+    @property
+    def stamps(self) -> list[int]:
+        return [row["log_time"] for row in self.rows]
+
+    def values(self, component: str) -> list[Any]:
+        """Return the only instance of a component in each row, None where the row has not any."""
+        return [(row.get(component) or [None])[0] for row in self.rows]
+
+
+def _rows(batch: pa.RecordBatch) -> list[dict[str, Any]]:
+    columns = {name: batch.column(name) for name in batch.schema.names}
+    if "log_time" in columns:
+        columns["log_time"] = columns["log_time"].cast(pa.int64())
+    return [{name: column[index].as_py() for name, column in columns.items()} for index in range(batch.num_rows)]
+
+
+def grid_of(row: Mapping[str, Any]) -> np.ndarray:
+    """Return the cells of a logged map, row 0 with the lowest y again."""
+    shape = row["GridMap:format"][0]
+    return np.array(row["GridMap:data"][0], np.uint8).view(np.int8).reshape(shape["height"], shape["width"])[::-1]
+
+
+# What is there, and when
+
+
+def test_the_entities_are_those_of_the_documented_tree(recording: Path) -> None:
+    found = {chunk.entity_path for chunk in RrdReader(recording).stream()}
+    for robot in ("r1", "r2", STRANGER_PATH):
+        assert {f"/merged/robots/{robot}{part}" for part in ("", "/map", "/walls", "/outline")} <= found
+        assert f"/merged/labels/{robot}" in found
+    assert {"/merged/map", "/decisions", "/robots", "/about", "/plots/step_ms/merge"} <= found
+    assert {f"/evidence/r2/{name}" for name in ("overlay", "orientation_spectra", "correlation_surface")} <= found
+    assert not any("r4" in path for path in found if not path.startswith("/plots"))
+
+
+def test_all_times_are_those_of_the_ticks(recording: Path) -> None:
+    stamps: set[int] = set()
+    for chunk in RrdReader(recording).stream():
+        assert chunk.is_static or set(chunk.timeline_names) == {"log_time", "tick"}
+        if not chunk.is_static:
+            stamps |= {row["log_time"] for row in _rows(chunk.to_record_batch())}
+    assert stamps == set(STAMPS)
+    assert Entity(recording, "/plots/step_ms/merge").stamps == list(STAMPS)
+
+
+def test_maps_are_logged_when_they_change(recording: Path) -> None:
+    assert Entity(recording, "/merged/robots/r1/map").stamps == [STAMPS[1]]
+    assert Entity(recording, "/merged/robots/r2/map").stamps == [STAMPS[index] for index in (0, 2, 4, 5)]
+    assert Entity(recording, "/merged/map").stamps == [STAMPS[index] for index in (1, 2, 4, 5)]
+
+
+def test_maps_are_those_of_the_result(recording: Path, story: list[Event]) -> None:
+    last = next(event for event in reversed(story) if isinstance(event, Merged))
+    known = last.result.grids["r2"].cropped_to_known()
+    for path, grid in (("/merged/map", last.result.merged), ("/merged/robots/r2/map", known)):
+        row = Entity(recording, path).rows[-1]
+        assert np.array_equal(grid_of(row), grid.cells)
+        pose = grid.map_from_grid
+        assert row["GridMap:translation"][0] == pytest.approx([pose.x_m, pose.y_m, 0.0])
+        assert row["GridMap:quaternion"][0] == pytest.approx([0, 0, np.sin(pose.yaw_rad / 2), np.cos(pose.yaw_rad / 2)])
+        assert row["GridMap:cell_size"][0] == pytest.approx(grid.resolution_m)
+    walls = Entity(recording, "/merged/robots/r2/walls").rows[-1]["Points3D:positions"]
+    assert len(walls) == np.count_nonzero(known.cells >= 65)
+
+
+def test_a_placed_map_is_under_its_placement(recording: Path) -> None:
+    row = Entity(recording, "/merged/robots/r2").rows[-1]
+    true = reference_from("r2")
+    assert row["Transform3D:translation"][0][:2] == pytest.approx([true.x_m, true.y_m], abs=0.15)
+    x, y, z, w = row["Transform3D:quaternion"][0]
+    assert (x, y) == (0, 0)
+    assert 2 * np.arctan2(z, w) == pytest.approx(true.yaw_rad, abs=0.02)
+
+
+def test_a_map_that_is_not_placed_is_beside_the_merged_map_with_its_reason(recording: Path, story: list[Event]) -> None:
+    last = next(event for event in reversed(story) if isinstance(event, Merged))
+    assert last.result.robots[STRANGER].status is Status.UNMERGED
+    merged = last.result.merged
+    right_m = merged.map_from_grid.x_m + merged.cols * merged.resolution_m
+    outline = Entity(recording, f"/merged/robots/{STRANGER_PATH}/outline").rows[-1]["LineStrips3D:strips"][0]
+    x_m, *_ = Entity(recording, f"/merged/robots/{STRANGER_PATH}").rows[-1]["Transform3D:translation"][0]
+    assert min(corner[0] for corner in outline) + x_m > right_m
+    label = Entity(recording, f"/merged/labels/{STRANGER_PATH}").values("Points3D:labels")[-1]
+    reason = last.result.robots[STRANGER].reason.message
+    assert label.replace("\n", " ") == f"{STRANGER} is not merged: {reason}"
+
+
+def test_labels_follow_the_status(recording: Path) -> None:
+    entity = Entity(recording, "/merged/labels/r2")
+    labels = dict(zip(entity.stamps, entity.values("Points3D:labels"), strict=True))
+    assert "the reference r1 has no map yet" in labels[STAMPS[0]].replace("\n", " ")
+    assert labels[STAMPS[2]] == "r2"
+    assert labels[STAMPS[4]].startswith("r2 is not merged:")
+    assert labels[STAMPS[5]] == "r2"
+
+
+def test_pictures_are_those_of_the_events(recording: Path, story: list[Event]) -> None:
+    for event in story:
+        for item in event.pictures if isinstance(event, Merged) else ():
+            path = f"/evidence/{STRANGER_PATH if item.robot == STRANGER else item.robot}/{item.picture.step}"
+            entity = Entity(recording, path)
+            row = entity.rows[entity.stamps.index(event.stamp_ns)]
+            shape = row["Image:format"][0]
+            pixels = np.array(row["Image:buffer"][0], np.uint8).reshape(shape["height"], shape["width"], 3)
+            assert np.array_equal(pixels, item.picture.rgb)
+
+
+# Numbers and words
+
+
+def test_refused_values_are_apart_from_those_of_placed_maps(recording: Path) -> None:
+    placed = Entity(recording, "/plots/acceptance/placed/r2")
+    values = dict(zip(placed.stamps, placed.values("Scalars:scalars"), strict=True))
+    assert list(values) == [STAMPS[index] for index in (2, 3, 4, 5)]
+    assert np.isnan(values.pop(STAMPS[4]))
+    assert min(values.values()) > 0.95
+    assert not set(Entity(recording, "/plots/overlap_m2/refused/r2").stamps) & set(values)
+
+
+def test_decisions_say_what_happened_and_why(recording: Path) -> None:
+    entity = Entity(recording, "/decisions")
+    said = list(zip(entity.stamps, entity.values("TextLog:level"), entity.values("TextLog:text"), strict=True))
+    expected = [
+        (STAMPS[2], "WARN", "r4: a message of /r4/map was skipped: it has 0 × 0 cells"),
+        (STAMPS[2], "INFO", "r2 placed on r1: "),
+        (STAMPS[4], "WARN", "r2 is withdrawn: not placed on "),
+        (STAMPS[5], "INFO", "r2 placed on r1: "),
+        (STAMPS[5], "WARN", "end: 2 of 4 robots are in the merged map"),
+        (STAMPS[5], "WARN", f"{STRANGER} is not merged: not placed on "),
+        (STAMPS[5], "WARN", "r4 is not merged: no map yet"),
+    ]
+    for (stamp_ns, level, words), (expected_ns, expected_level, begin) in zip(said, expected, strict=True):
+        assert (stamp_ns, level) == (expected_ns, expected_level)
+        assert words.startswith(f"+{(stamp_ns - STAMPS[0]) / 1e9:.1f} s  {begin}")
+
+
+def test_the_table_has_every_robot(recording: Path) -> None:
+    text = Entity(recording, "/robots").values("TextDocument:text")[-1]
+    head, rule, *rows = [line.strip("| ").split(" | ") for line in text.splitlines()]
+    assert head[0] == "robot"
+    assert set(rule) == {"---"}
+    assert [row[0] for row in rows] == list(ROBOTS)
+    assert [row[1] for row in rows] == ["reference", "merged", "unmerged", "no\\_map"]
+
+
+def test_about_holds_inputs_and_settings(recording: Path) -> None:
+    entity = Entity(recording, "/about")
+    assert "log_time" not in entity.rows[0]
+    (text,) = entity.values("TextDocument:text")
+    assert '"sha256": "ab"' in text
+    assert '"min_acceptance": 0.95' in text
+
+
+# What the viewer is told
+
+
+def test_the_blueprint_opens_on_the_end_from_above(recording: Path) -> None:
+    reader = RrdReader(recording)
+    (store,) = reader.blueprints()
+    assert store.application_id == reader.recordings()[0].application_id
+    logged = [row for chunk in reader.stream(store=store) for row in _rows(chunk.to_record_batch())]
+    merged = {name: value for row in logged for name, value in row.items() if value}
+    assert merged["TimePanelBlueprint:timeline"] == ["log_time"]
+    assert merged["TimePanelBlueprint:play_state"] == [3]  # following: at the newest data
+    assert merged["EyeControls3D:position"][0][:2] == merged["EyeControls3D:look_target"][0][:2]
+    classes = [row["ViewBlueprint:class_identifier"][0] for row in logged if row.get("ViewBlueprint:class_identifier")]
+    assert {"3D", "2D", "TimeSeries", "TextLog", "TextDocument"} <= set(classes)
+
+
+def test_two_runs_write_the_same_but_for_the_time_they_took(
+    story: list[Event], recording: Path, tmp_path: Path
+) -> None:
+    slower = [replace(event, timing=Timing(3.0, 4.0)) if isinstance(event, Merged) else event for event in story]
+    again = written(tmp_path / "again.rrd", slower)
+    assert RrdReader(again).recordings()[0].recording_id == RrdReader(recording).recordings()[0].recording_id
+    assert contents(again) == contents(recording)
+
+
+def contents(path: Path) -> list[tuple[str, str]]:
+    found = []
+    for chunk in RrdReader(path).stream():
+        if not chunk.entity_path.startswith("/plots/step_ms"):
+            rows = _rows(chunk.to_record_batch())
+            found.append((chunk.entity_path, str([{**row, "rerun.controls.RowId": None} for row in rows])))
+    return sorted(found)
+
+
+# Odd runs
+
+
+def test_a_run_without_any_map_is_still_a_recording(tmp_path: Path) -> None:
+    skipped = Skipped("r1", "/r1/map", 12, SkipCause.EMPTY, "it has 0 × 0 cells")
+    started, finished = events_of(["r1"], {})
+    path = written(tmp_path / "none.rrd", [started, skipped, finished])
+    texts = Entity(path, "/decisions").values("TextLog:text")
+    assert "r1 is not merged: no map yet" in texts
+
+
+def test_maps_that_know_nothing_or_have_no_walls_are_no_trouble(tmp_path: Path) -> None:
+    ticks = {
+        STAMPS[0]: {"r1": filled(-1, 20, 30), "r2": filled(0, 20, 30)},
+        STAMPS[1]: {"r1": filled(0, 20, 30), "r2": filled(-1, 20, 30)},
+        STAMPS[2]: {"r1": Grid(np.zeros((0, 0), np.int8), 0.05)},
+    }
+    path = written(tmp_path / "bare.rrd", events_of(["r1", "r2"], ticks))
+    assert Entity(path, "/merged/robots/r1/map").stamps == list(STAMPS[:3])
+    assert Entity(path, "/merged/labels/r2").rows[-1].get("Clear:is_recursive") == [False]
+
+
+def test_a_map_larger_than_a_texture_is_shown_coarser(tmp_path: Path) -> None:
+    cells = np.zeros((3, MAX_SIDE_CELLS + 2), np.int8)
+    cells[1, 5] = 100
+    path = written(tmp_path / "wide.rrd", events_of(["r1"], {STAMPS[0]: {"r1": Grid(cells, 0.05)}}))
+    row = Entity(path, "/merged/robots/r1/map").rows[0]
+    assert row["GridMap:cell_size"][0] == pytest.approx(0.1)
+    assert grid_of(row).shape == (2, MAX_SIDE_CELLS // 2 + 1)
+    assert grid_of(row).max() == 100
+
+
+def test_a_run_without_pictures_has_no_views_for_them(story: list[Event], tmp_path: Path) -> None:
+    plain = [replace(event, pictures=()) if isinstance(event, Merged) else event for event in story]
+    reader = RrdReader(written(tmp_path / "plain.rrd", plain))
+    (store,) = reader.blueprints()
+    text = str([_rows(chunk.to_record_batch()) for chunk in reader.stream(store=store)])
+    assert "Spatial3DView" not in text
+    assert "'3D'" in text
+    assert "'2D'" not in text
+
+
+# The file
+
+
+def test_the_final_name_is_given_only_when_published(story: list[Event], tmp_path: Path) -> None:
+    path = tmp_path / "run.rrd"
+    sink = RerunSink(path, OutputOptions(tmp_path / "run.mcap"))
+    for event in story[:3]:
+        sink.take(event)
+    assert [each.name for each in tmp_path.iterdir()] == ["run.rrd.partial"]
+    sink.discard()
+    sink.discard()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_is_not_there_is_an_output_error(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match=r"run\.rrd: cannot be written: No such file or directory"):
+        RerunSink(tmp_path / "none" / "run.rrd", OutputOptions(tmp_path / "none" / "run.mcap"))
+
+
+def test_errors_of_the_library_are_output_errors(
+    story: list[Event], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_self: RrdStream, _stamp_ns: int) -> None:
+        raise RuntimeError("it broke")
+
+    sink = RerunSink(tmp_path / "run.rrd", OutputOptions(tmp_path / "run.mcap"))
+    sink.take(story[0])
+    monkeypatch.setattr(RrdStream, "at", fail)
+    with pytest.raises(OutputError, match=r"run\.rrd: cannot be written: it broke"):
+        sink.take(story[1])
+    sink.discard()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit on the size of files there")
+def test_a_full_disk_ends_the_run_and_does_not_hang(tmp_path: Path) -> None:
+    script = textwrap.dedent("""
+        import resource, signal, sys, uuid
+        from pathlib import Path
+        import numpy as np, rerun as rr
+        from replay.sinks import rerun_stream
+
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+        rerun_stream._PATIENCE_S = 0.3
+        path = Path(sys.argv[1])
+        stream = rerun_stream.RrdStream(path, uuid.UUID(int=7))
+        stream.at(1)
+        noise = np.random.default_rng(1).integers(0, 255, (300, 300, 3), np.uint8)
+        for name in "abc":
+            stream.log([name], rr.Image(noise))
+        try:
+            stream.finish()
+        except RuntimeError as error:
+            print("refused:", error)
+        stream.close()
+    """)
+    done = subprocess.run(
+        [sys.executable, "-c", script, tmp_path / "run.rrd"], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("refused: ")
+    assert "is the disk full?" in done.stdout
+
+
+# Where maps are shown
+
+
+SQUARE = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
+
+
+def test_parked_maps_overlap_nothing(story: list[Event]) -> None:
+    last = next(event.result for event in reversed(story) if isinstance(event, Merged))
+    refused = last.robots[STRANGER]
+    robots = {"r1": last.robots["r1"]}
+    for index in range(7):
+        placement = replace(refused.placement, component=f"s{index}", component_from_map=Sim2(index, 0.0, 0.3 * index))
+        robots[f"s{index}"] = replace(refused, placement=placement)
+    corners_m = {robot: SQUARE * (1.0 + index % 3) for index, robot in enumerate(robots)}
+    layout = lay_out(replace(last, robots=robots), corners_m)
+    assert list(layout.merged_from_map) == list(robots)
+    boxes = [Box.around(pose.apply(corners_m[robot])) for robot, pose in layout.merged_from_map.items()]
+    for index, one in enumerate(boxes):
+        for other in boxes[index + 1 :]:
+            beside = one.x1_m < other.x0_m or other.x1_m < one.x0_m
+            assert beside or one.y1_m < other.y0_m or other.y1_m < one.y0_m
+    assert layout.extent == Box.around(np.array([[b.x0_m, b.y0_m] for b in boxes] + [[b.x1_m, b.y1_m] for b in boxes]))
+
+
+def test_maps_that_fit_each_other_are_parked_as_they_fit(story: list[Event]) -> None:
+    last = next(event.result for event in reversed(story) if isinstance(event, Merged))
+    refused = last.robots[STRANGER]
+    fits = Sim2(1.0, 2.0, 0.5)
+    placements = {"a": IDENTITY, "b": fits}
+    robots = {
+        robot: replace(refused, placement=replace(refused.placement, component="a", component_from_map=pose))
+        for robot, pose in placements.items()
+    }
+    shown = lay_out(replace(last, robots=robots), {"a": SQUARE, "b": SQUARE}).merged_from_map
+    assert (shown["a"].inverse() @ shown["b"]).is_close(fits, distance_m=1e-9, angle_rad=1e-9, at_m=(0.0, 0.0))
+
+
+# The viewer
+
+
+def renderer_missing() -> str | None:
+    """Return why nothing can be drawn here, or None."""
+    if sys.platform != "linux":
+        return None
+    drivers = [Path(folder) / "vulkan" / "icd.d" for folder in ("/usr/share", "/etc", "/usr/local/share")]
+    if os.environ.get("VK_ICD_FILENAMES") or any(any(folder.glob("*.json")) for folder in drivers):
+        return None
+    return "there is no Vulkan driver; a software one is in mesa-vulkan-drivers"
+
+
+def test_the_viewer_shows_it_without_complaint(recording: Path, tmp_path: Path) -> None:
+    if missing := renderer_missing():
+        pytest.skip(missing)
+    from scripts.screenshot import complaints, show, viewer
+
+    with viewer("1000x700") as client:
+        for time_fraction in (None, 0.0, 0.5):
+            show(client, recording, time_fraction)
+            assert complaints(client) == []
+        views = {view.name for view in client.get_state().views}
+        client.save_screenshot(str(tmp_path / "shot.png"))
+    assert {"Maps", "overlay", "Acceptance index", "Decisions"} <= views
+    assert (tmp_path / "shot.png").stat().st_size > 10_000
