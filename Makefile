@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test check format docs bench clean
+.PHONY: demo test check format docs bench picture clean
 
 demo: $(VENV)/.runtime ## set up and merge a sample recording
 	mkdir -p out
@@ -27,6 +27,11 @@ docs: $(VENV)/.dev ## write docs/cli.md anew from --help
 
 bench: $(VENV)/.dev ## measure placements on real recordings against their truth
 	$(BIN)/python -m benchmarks.real
+
+picture: $(VENV)/.runtime ## take README's picture anew; needs a graphics card or a software renderer (mesa-vulkan-drivers)
+	mkdir -p out
+	$(BIN)/replay merge samples/three_robots.bag -o out/three_robots.mcap --force
+	$(BIN)/python scripts/screenshot.py out/three_robots.rrd docs/images/three_robots.png
 
 clean:
 	rm -rf $(VENV) out
