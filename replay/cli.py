@@ -49,7 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, _terminate)
     try:
-        return _dispatch(_parser().parse_args(arguments))
+        status = _dispatch(_parser().parse_args(arguments))
+        sys.stdout.flush()
+        return status
     except ReplayError as error:
         print(f"replay: error: {error}", file=sys.stderr)
         return error.exit_code
@@ -241,15 +243,19 @@ def _output_options(options: argparse.Namespace, run: RunOptions) -> OutputOptio
 def _refuse_outputs(outputs: OutputOptions, run: RunOptions) -> None:
     """Refuse outputs that exist, that are inputs, or that have no folder."""
     from replay.sinks import output_paths
+    from replay.sinks.partial_file import PartialFile
 
     paths = output_paths(outputs).values()
     inputs = {item.path.resolve() for item in run.runs}
-    for path in paths:
-        if path.resolve() in inputs:
-            raise UsageError(f"{path} is an input; give another name with --output")
+    for path in (name for final in paths for name in (final, PartialFile(final).partial)):
+        if {path.resolve(), path.resolve().parent} & inputs:
+            raise UsageError(f"{path} is an input, or would be written into one; give another name with --output")
     existing = [str(path) for path in paths if path.exists()]
     if existing and not outputs.force:
         raise UsageError(f"{', '.join(existing)} exists already; give --force to replace it, or another --output")
+    for path in paths:
+        if path.is_dir():
+            raise OutputError(f"{path}: a folder has this name; remove it, or give another --output")
     if not outputs.mcap.absolute().parent.is_dir():
         raise OutputError(f"{outputs.mcap.absolute().parent}: there is no such folder; make it, or choose another")
 

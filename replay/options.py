@@ -56,7 +56,9 @@ class TimeBound:
                 "such as 1700000000000000000ns, or ISO 8601 such as 2026-05-01T12:00:00Z"
             ) from None
         since = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
-        return TimeBound((since.days * 86_400 + since.seconds) * NS_PER_S + since.microseconds * 1_000, relative=False)
+        beyond_us = re.search(r"[.,]\d{6}(\d{1,3})", text)  # which datetime leaves out
+        whole_ns = (since.days * 86_400 + since.seconds) * NS_PER_S + since.microseconds * 1_000
+        return TimeBound(whole_ns + (int(beyond_us[1].ljust(3, "0")) if beyond_us else 0), relative=False)
 
     def absolute_ns(self, start_ns: int) -> int:
         """Return the time on the run's clock, whose first map is at ``start_ns``."""

@@ -14,10 +14,11 @@ from replay.events import RobotInput
 from replay.options import RunOptions
 from replay.selection import Selected, select
 from replay.sources import open_source
-from replay.sources.base import Source, SourceInfo
+from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
 from replay.timeline import Feed, Tally, Window
 
 MERGED_FRAME = "merged"
+_MAP_TYPES = (GRID_TYPE, UPDATE_TYPE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +94,8 @@ def _plan(sources: list[Source], options: RunOptions) -> Plan:
         options.stop.absolute_ns(start_ns) if options.stop else None,
         options.reorder_window_ns,
     )
+    if window.start_ns is not None and window.stop_ns is not None and window.start_ns >= window.stop_ns:
+        raise UsageError("--stop is not after --start, so that no map would be used; give a later --stop")
     return Plan(
         infos,
         _robots(selected, probes, clocks, infos),
@@ -131,7 +134,7 @@ def _robots(
                 topic.message_count
                 for index in item.inputs
                 for topic in infos[index].topics
-                if topic.name in item.topics
+                if topic.name in item.topics and topic.msgtype in _MAP_TYPES
             ),
         )
         for item in selected
@@ -150,12 +153,12 @@ def _feeds(
     feeds = []
     for index, source in enumerate(sources):
         own = [item for item in selected if index in item.inputs]
-        names = {topic.name for topic in source.info.topics}
+        names = {topic.name for topic in source.info.topics if topic.msgtype in _MAP_TYPES}
         feeds.append(
             Feed(
                 source=source,
                 robot_of={topic: item.robot for item in own for topic in item.topics if topic in names},
-                clocks={item.robot: clocks[item.robot] for item in own},
+                clocks={item.robot: "none" if source.info.start_ns is None else clocks[item.robot] for item in own},
                 offsets_ns={item.robot: offsets.get((index, item.robot), 0) for item in own},
                 untimed_ns=untimed_ns,
             )

@@ -20,6 +20,7 @@ from replay.events import Report, RobotInput, Skipped
 
 SCHEMA = "replay.report/1"
 _DIGITS = 6
+_MAX_YAW_RAD = 3.141592  # rounded up, π would lie outside (−π, π]
 
 Json = dict[str, Any]
 
@@ -109,7 +110,7 @@ def _pose(pose: Sim2 | None) -> Json | None:
     return {
         "x_m": _round(pose.x_m),
         "y_m": _round(pose.y_m),
-        "yaw_rad": _round(wrap_angle(pose.yaw_rad)),
+        "yaw_rad": max(-_MAX_YAW_RAD, min(_MAX_YAW_RAD, _round(wrap_angle(pose.yaw_rad)))),
         "scale": _round(pose.scale),
     }
 

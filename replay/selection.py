@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -90,11 +90,15 @@ def select(
     if not counts.total():
         raise InputError(_nothing(runs, infos))
     found = _discovered(runs, infos, topics, counts)
+    there = _flags(found or _discovered(runs, infos, (), counts))
     wanted = list(robots) if robots is not None else _all_names(runs, found)
+    if not wanted:
+        said = " ".join(f"--topic {choice.topic}" for choice in topics)
+        raise UsageError(f"{said}: there is no map that fits; there are: {there}")
     selected = []
     for robot in wanted:
         candidates = found.get(robot) or _by_component(robot, runs, infos, topics, counts)
-        selected.append(_one(robot, candidates, found))
+        selected.append(_one(robot, candidates, there))
     _refuse_shared(selected)
     return tuple(selected)
 
@@ -115,7 +119,7 @@ def _discovered(
     """Return for each robot that can be named the map topics that may be its own."""
     found: dict[str, Candidates] = {}
     for index, (run, info) in enumerate(zip(runs, infos, strict=True)):
-        names = _names_in(run, _grid_topics(info))
+        names = _names_in(run, _grid_topics(info), topics)
         for topic, robot in names.items():
             if _chosen(robot, topic, topics):
                 candidates = found.setdefault(robot, {})
@@ -129,10 +133,13 @@ def _discovered(
     return {robot: candidates for robot, candidates in best.items() if not maps or robot in maps | asked}
 
 
-def _names_in(run: RunPath, topics: Sequence[str]) -> dict[str, str]:
+def _names_in(run: RunPath, topics: Sequence[str], choices: Sequence[TopicChoice]) -> dict[str, str]:
     """Return the robot of each map topic of one input."""
     if run.robot is not None:
         return dict.fromkeys(topics, run.robot)
+    patterns = [choice.topic for choice in choices if choice.robot is None and "{robot}" in choice.topic]
+    if patterns:
+        return _named_by_patterns(topics, patterns)
     named = [topic for topic in topics if _namespace(topic)]
     if any(not _NOT_A_MAP.search(topic) for topic in named):
         return _named_by_namespace(named)
@@ -140,14 +147,26 @@ def _names_in(run: RunPath, topics: Sequence[str]) -> dict[str, str]:
     return dict.fromkeys(bare, _stem(run.path)) if bare else _named_by_namespace(named)
 
 
+def _named_by_patterns(topics: Sequence[str], patterns: Sequence[str]) -> dict[str, str]:
+    """Name robots by what stands at ``{robot}`` in the patterns that their topics fit."""
+    names = {}
+    for pattern in patterns:
+        before, *after = map(re.escape, pattern.split("{robot}"))
+        shape = re.compile(before + "([^/]+)" + r"\1".join(after))
+        names.update({topic: match[1] for topic in topics if (match := shape.fullmatch(topic))})
+    return names
+
+
 def _named_by_namespace(topics: Sequence[str]) -> dict[str, str]:
-    """Name robots by the first part of the namespace or, where that is shared by several robots, by the last."""
+    """Name robots by the first part of the namespace or, where all share that, by the last."""
     maps = [topic for topic in topics if not _NOT_A_MAP.search(topic)] or list(topics)
     names = {}
     for topic in maps:
         first = _namespace(topic)[0]
         alike = {other: _namespace(other) for other in maps if _namespace(other)[0] == first}
-        fleet = f"/{first}/map" not in alike and len({space[-1] for space in alike.values()}) == len(alike) > 1
+        distinct = len({space[-1] for space in alike.values()})
+        nested = all(len(space) > 1 for space in alike.values())
+        fleet = nested and distinct == len(alike) == len(maps) > 1
         names[topic] = _namespace(topic)[-1] if fleet else first
     return names
 
@@ -171,7 +190,7 @@ def _said_outright(choice: TopicChoice, runs: Sequence[RunPath], infos: Sequence
     holders = own or [index for index, run in enumerate(runs) if run.robot is None]
     inputs = tuple(index for index in holders if choice.topic in _grid_topics(infos[index]))
     if not inputs:
-        there = _flags({topic: str(choice.robot) for index in holders for topic in _grid_topics(infos[index])})
+        there = _flags({str(choice.robot): [topic for index in holders for topic in _grid_topics(infos[index])]})
         raise UsageError(f"--topic {choice.robot}={choice.topic}: no map on this topic; there are: {there}")
     return {choice.topic: inputs}
 
@@ -218,12 +237,11 @@ def _all_names(runs: Sequence[RunPath], found: Mapping[str, Candidates]) -> list
     return [*given, *sorted(set(found) - set(given))]
 
 
-def _one(robot: str, candidates: Candidates, found: Mapping[str, Candidates]) -> Selected:
+def _one(robot: str, candidates: Candidates, there: str) -> Selected:
     if not candidates:
-        there = _flags({topic: name for name in sorted(found) for topic in found[name]}) or "none"
         raise UsageError(f"there is no map of robot {robot!r}; there are: {there}")
     if len(candidates) > 1:
-        choices = _flags(dict.fromkeys(candidates, robot))
+        choices = _flags({robot: candidates})
         raise UsageError(f"robot {robot!r} has {len(candidates)} map topics; choose one of: {choices}")
     topic, inputs = next(iter(candidates.items()))
     return Selected(robot, topic, inputs)
@@ -242,8 +260,9 @@ def _refuse_shared(selected: Sequence[Selected]) -> None:
                 )
 
 
-def _flags(robots: Mapping[str, str]) -> str:
-    return "  ".join(f"--topic {robot}={topic}" for topic, robot in sorted(robots.items(), key=lambda item: item[::-1]))
+def _flags(topics: Mapping[str, Iterable[str]]) -> str:
+    """Return the topics of each robot as flags to paste."""
+    return "  ".join(f"--topic {robot}={topic}" for robot in sorted(topics) for topic in sorted(set(topics[robot])))
 
 
 def _nothing(runs: Sequence[RunPath], infos: Sequence[SourceInfo]) -> str:

@@ -163,18 +163,31 @@ def _in_order(feed: Feed, tally: Tally, window: Window) -> Iterator[_Arrival]:
 
 
 def _stamped(feed: Feed, tally: Tally, window: Window) -> Iterator[_Arrival]:
-    """Decode a recording's messages and give each its time on the reference's clock."""
+    """Decode a recording's messages and give each its time on the reference's clock.
+
+    Where that is not known, for a message that cannot be decoded or whose header has no time, it is that of the newest
+    message before it.
+    """
     last_ns = feed.untimed_ns
+    lead_ns: int | None = None
     for raw in feed.source.messages(tuple(feed.robot_of)):
         robot = feed.robot_of[raw.topic]
         try:
             message = decode(raw)
         except BadMessage as error:
-            tally.count(raw)
-            yield _Arrival(last_ns, robot, raw, _skipped(robot, raw, error))
+            if lead_ns is None or _inside(raw.log_time_ns + lead_ns, window):
+                tally.count(raw)
+                yield _Arrival(last_ns, robot, raw, _skipped(robot, raw, error))
             continue
         clock = feed.clocks[robot]
-        time_ns = feed.untimed_ns if clock == "none" else stamp_ns(clock, raw, message) + feed.offsets_ns[robot]
+        if clock == "none":
+            time_ns = feed.untimed_ns
+        elif clock == "header" and message.stamp_ns <= 0:
+            time_ns = last_ns
+            tally.late += 1
+        else:
+            time_ns = max(0, stamp_ns(clock, raw, message) + feed.offsets_ns[robot])
+            lead_ns = time_ns - raw.log_time_ns
         if clock != "none" and not _inside(time_ns, window):
             continue
         tally.count(raw)

@@ -34,12 +34,21 @@ START = 1_700_000_000 * SECOND
 
 @dataclass(frozen=True)
 class Recorded:
-    """One message to record; ``fields`` are what differs from `map_fields`' defaults."""
+    """One message to record.
+
+    Parameters
+    ----------
+    fields
+        What the message says, as `map_fields` returns it for a map.
+    lost_bytes
+        How many bytes are missing at its end.
+    """
 
     topic: str
     msgtype: str
     log_time_ns: int
     fields: dict[str, Any]
+    lost_bytes: int = 0
 
 
 def grid(seed: int, rows: int = 40, cols: int = 60) -> Grid:
@@ -101,12 +110,16 @@ def in_order(messages: Iterable[Recorded], topics: Iterable[str]) -> list[Record
 
 def as_cdr(message: Recorded) -> bytes:
     store = ros2_typestore()
-    return bytes(store.serialize_cdr(_message(store, message, ros1=False), message.msgtype))
+    return _cut(bytes(store.serialize_cdr(_message(store, message, ros1=False), message.msgtype)), message)
 
 
 def as_ros1(message: Recorded) -> bytes:
     store = ros1_typestore()
-    return bytes(store.serialize_ros1(_message(store, message, ros1=True), message.msgtype))
+    return _cut(bytes(store.serialize_ros1(_message(store, message, ros1=True), message.msgtype)), message)
+
+
+def _cut(data: bytes, message: Recorded) -> bytes:
+    return data[: len(data) - message.lost_bytes]
 
 
 def _message(store: Any, message: Recorded, *, ros1: bool) -> Any:

@@ -161,6 +161,7 @@ def outline(x0_m: float, y0_m: float, x1_m: float, y1_m: float, thick_m: float =
 
 
 FLAT_M = (9.0, 6.0)
+BESIDE_THE_FLAT = Sim2(-1.0, -1.0)
 FLAT_WALLS = [
     *outline(0.0, 0.0, *FLAT_M),
     (3.5, 0.0, 3.6, 2.2),
@@ -174,7 +175,11 @@ FLAT_WALLS = [
 
 
 def flat(
-    floor_from_map: Sim2 = Sim2(-1.0, -1.0), *, resolution_m: float = 0.05, ragged: int | None = None, size_m: float = 11.0
+    floor_from_map: Sim2 = BESIDE_THE_FLAT,
+    *,
+    resolution_m: float = 0.05,
+    ragged: int | None = None,
+    size_m: float = 11.0,
 ) -> Grid:
     """Return a drawn flat of 9 × 6 m without any symmetry."""
     return drawn(

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from replay.options import OutputOptions
 from replay.sinks.base import Sink
+from replay.sinks.partial_file import PartialFile
 
 __all__ = ["SINKS", "Sink", "open_sinks", "output_paths"]
 
@@ -28,8 +29,9 @@ def output_paths(options: OutputOptions) -> dict[str, Path]:
 def open_sinks(options: OutputOptions, extra: Sequence[Sink] = ()) -> Iterator[tuple[Sink, ...]]:
     """Open the sinks that were asked for; publish what they wrote if all went well, else remove it."""
     sinks: list[Sink] = []
+    paths = output_paths(options)
     try:
-        for name, path in output_paths(options).items():
+        for name, path in paths.items():
             module, _, attribute = SINKS[name].partition(":")
             sinks.append(getattr(import_module(module), attribute)(path, options))
         sinks.extend(extra)
@@ -41,4 +43,6 @@ def open_sinks(options: OutputOptions, extra: Sequence[Sink] = ()) -> Iterator[t
     except BaseException:
         for sink in sinks:
             sink.discard()
+        for path in paths.values():  # of a sink that was interrupted while it was opened
+            PartialFile(path).discard()
         raise

@@ -1,0 +1,281 @@
+"""What every matcher does, whatever its method: right or refused, and always explained."""
+
+import math
+from dataclasses import fields, is_dataclass
+
+import numpy as np
+import pytest
+
+from mapmerge.grid import Grid
+from mapmerge.match import MATCHERS, Match, load_matcher
+from mapmerge.reasons import ReasonCode
+from mapmerge.render import MAX_SIDE_PX, render
+from mapmerge.sim2 import IDENTITY, Sim2
+from samples.mission import known_at
+from tests.floors import (
+    BAY_M,
+    CONFIG,
+    FLAT_M,
+    FLAT_WALLS,
+    Pair,
+    corridor_run,
+    drawn,
+    errors,
+    filled,
+    flat,
+    in_frame,
+    last_map,
+    match_grids,
+    office_pair,
+    office_run,
+    outline,
+    pair_of,
+    within,
+)
+
+POSITION_M, ANGLE_DEG = 0.1, 0.5
+OF_A_PAIR = {
+    ReasonCode.ACCEPTED,
+    ReasonCode.TOO_LITTLE_STRUCTURE,
+    ReasonCode.NO_CANDIDATE,
+    ReasonCode.TOO_LITTLE_OVERLAP,
+    ReasonCode.WALLS_DISAGREE,
+    ReasonCode.LOW_ACCEPTANCE,
+    ReasonCode.AMBIGUOUS,
+}
+
+
+@pytest.fixture(params=sorted(MATCHERS), scope="module")
+def matcher(request):
+    return load_matcher(request.param)
+
+
+def checked(match: Match) -> Match:
+    """Return the match, once all that holds for every match is found to hold."""
+    assert match.accepted == (match.reason.code is ReasonCode.ACCEPTED)
+    assert match.reason.code in OF_A_PAIR
+    assert len(match.reason.message.split()) >= 4
+    assert not {"nan", "inf", "None"} & set(match.reason.message.replace(",", " ").split())
+    assert (match.target_from_source is None) == (match.scores is None)
+    if match.scores is not None:
+        assert all(math.isfinite(getattr(match.scores, field.name)) for field in fields(match.scores))
+        assert 0.0 <= match.scores.acceptance <= 1.0
+        assert 0.0 <= match.scores.overlap_fraction <= 1.0
+        assert 0.0 <= match.scores.wall_agreement <= 1.0
+    if match.accepted:
+        assert match.target_from_source is not None
+        assert match.evidence
+    rivals = [rival.score_m for rival in match.rivals]
+    assert rivals == sorted(rivals, reverse=True)
+    assert len({evidence.step for evidence in match.evidence}) == len(match.evidence)
+    for evidence in match.evidence:
+        picture = render(evidence).rgb
+        assert picture.dtype == np.uint8
+        assert picture.shape[2:] == (3,)
+        assert 0 < max(picture.shape) <= MAX_SIDE_PX
+    return match
+
+
+def matched(matcher, target, source):
+    return checked(match_grids(matcher, target, source))
+
+
+def assert_right(match, pair):
+    assert match.accepted, match.reason
+    position_m, angle_deg = pair.errors(match.target_from_source)
+    assert position_m < POSITION_M
+    assert angle_deg < ANGLE_DEG
+
+
+def assert_refused(match):
+    assert not match.accepted, (match.reason, match.target_from_source)
+
+
+def alike(one, other):
+    """Tell whether two values are the same in every field and every bit."""
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and np.array_equal(one, other)
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(alike, one, other))
+    if is_dataclass(one):
+        return all(alike(getattr(one, field.name), getattr(other, field.name)) for field in fields(one))
+    return one == other
+
+
+class TestRight:
+    @pytest.mark.parametrize("seed", range(4))
+    def test_a_known_placement_is_found(self, matcher, seed):
+        pair = office_pair(seed)
+        assert_right(matched(matcher, pair.target, pair.source), pair)
+
+    @pytest.mark.parametrize("turn_rad", [0.0, 0.35, math.pi / 2, 2.2, math.pi, -2.9, -math.pi / 2, -0.8])
+    def test_at_any_turn(self, matcher, turn_rad):
+        walls = {"inside": within(0.0, 0.0, *FLAT_M), "walls": FLAT_WALLS}
+        corner = Sim2(*FLAT_M, turn_rad) @ Sim2(-11.0, -9.0)
+        target = drawn(**walls, size_m=(13.0, 10.0), floor_from_map=Sim2(-2.03, -2.01), ragged=1)
+        source = drawn(**walls, size_m=(16.0, 16.0), floor_from_map=corner, ragged=2)
+        pair = Pair(target, source, Sim2(-2.03, -2.01).inverse() @ corner)
+        assert_right(matched(matcher, target, source), pair)
+
+    @pytest.mark.parametrize("resolutions_m", [(0.05, 0.08), (0.08, 0.05), (0.1, 0.05), (0.05, 0.03)])
+    def test_at_different_resolutions(self, matcher, resolutions_m):
+        pair = office_pair(1, resolutions_m=resolutions_m)
+        assert_right(matched(matcher, pair.target, pair.source), pair)
+
+    @pytest.mark.parametrize("frames", [(Sim2(30.0, -8.0, 0.7), IDENTITY), (IDENTITY, Sim2(-3.0, 900.0, -2.2))])
+    def test_with_a_turned_origin(self, matcher, frames):
+        pair = office_pair(2)
+        moved = Pair(
+            in_frame(pair.target, frames[0]),
+            in_frame(pair.source, frames[1]),
+            frames[0] @ pair.target_from_source @ frames[1].inverse(),
+        )
+        match = matched(matcher, moved.target, moved.source)
+        assert_right(match, moved)
+        still = match_grids(matcher, pair.target, pair.source).target_from_source
+        expected = frames[0] @ still @ frames[1].inverse()
+        assert errors(match.target_from_source, expected, moved.shared_m) == pytest.approx((0.0, 0.0), abs=1e-6)
+
+    @pytest.mark.parametrize("seed", [0, 3])
+    def test_swapping_the_maps_gives_the_inverse(self, matcher, seed):
+        pair = office_pair(seed)
+        there = matched(matcher, pair.target, pair.source)
+        back = matched(matcher, pair.source, pair.target)
+        assert there.accepted
+        assert back.accepted
+        position_m, angle_deg = errors(back.target_from_source.inverse(), there.target_from_source, pair.shared_m)
+        assert position_m < POSITION_M
+        assert angle_deg < ANGLE_DEG
+        assert back.scores.wall_agreement == pytest.approx(there.scores.wall_agreement, abs=0.05)
+        assert back.scores.overlap_m2 == pytest.approx(there.scores.overlap_m2, rel=0.05)
+
+    def test_unknown_margins_do_not_matter(self, matcher):
+        pair = office_pair(3)
+        margin = np.pad(pair.source.cells, ((37, 5), (11, 53)), constant_values=-1)
+        source = Grid(margin, 0.05, pair.source.map_from_grid @ Sim2(-11 * 0.05, -37 * 0.05))
+        assert_right(matched(matcher, pair.target, source), pair)
+
+    def test_figures_are_those_of_the_truth(self, matcher):
+        pair = office_pair(1)
+        scores = matched(matcher, pair.target, pair.source).scores
+        centres_m = pair.source.centres_m(pair.source.known)
+        both_m2 = 0.05**2 * np.count_nonzero(known_at(pair.target, pair.target_from_source.apply(centres_m)))
+        assert scores.overlap_m2 == pytest.approx(both_m2, rel=0.05)
+        smaller_m2 = min(pair.target.known_area_m2, pair.source.known_area_m2)
+        assert scores.overlap_fraction == pytest.approx(both_m2 / smaller_m2, rel=0.05)
+
+
+class TestRepeats:
+    @pytest.mark.parametrize("seeds", [(1, 1), (1, 2)])
+    def test_the_same_maps_have_the_same_outcome_in_every_field(self, matcher, seeds):
+        target, source = office_pair(seeds[0]).target, office_pair(seeds[1]).source
+        copies = [Grid(grid.cells.copy(), grid.resolution_m, grid.map_from_grid) for grid in (target, source)]
+        assert alike(match_grids(matcher, target, source), match_grids(matcher, *copies))
+
+    def test_a_prepared_map_is_not_used_up(self, matcher):
+        pair, config = office_pair(1), CONFIG
+        target, source = (matcher.prepare(grid, 0.05, config) for grid in (pair.target, pair.source))
+        first = matcher.match(target, source, config)
+        matcher.match(source, target, config)
+        assert alike(first, matcher.match(target, source, config))
+
+
+LONG_WALLS = {
+    "one wall seen from one side": [(-99.0, 6.0, 99.0, 6.1)],
+    "two halls": [(-99.0, -0.1, 99.0, 0.0), (-99.0, 2.0, 99.0, 2.1), (-99.0, 6.0, 99.0, 6.1)],
+}
+
+BAYS = [((0, 3), (3, 6)), ((0, 4), (2, 6)), ((1, 4), (2, 5)), ((1, 3), (2, 4)), ((2, 4), (2, 4))]
+
+NEARLY_NOTHING = {
+    "no cells": filled(0, 0, 0),
+    "no rows": filled(0, 0, 9),
+    "all unknown": filled(-1, 120, 120),
+    "all free": filled(0, 120, 120),
+    "all occupied": filled(100, 120, 120),
+    "neither free nor occupied": filled(45, 120, 120),
+    "one cell": filled(100, 1, 1),
+    "one free cell": filled(0, 1, 1),
+    "one row": filled(100, 1, 300),
+    "one column": filled(100, 300, 1),
+    "one wall": drawn(within(0.0, 0.0, 14.0, 4.0), [(0.0, 2.0, 14.0, 2.1)], size_m=(14.0, 4.0)),
+    "one wall seen from one side": drawn(within(0.0, 0.0, 14.0, 2.0), [(0.0, 2.0, 14.0, 2.1)], size_m=(14.0, 4.0)),
+    "noise": Grid(np.random.default_rng(0).choice(np.array([-1, 0, 100], np.int8), (120, 120)), 0.05),
+    "coarse": filled(100, 2, 2, resolution_m=10.0),
+}
+
+
+class TestRefused:
+    @pytest.mark.parametrize("seeds", [(0, 1), (1, 3), (2, 0), (3, 2), (4, 5), (6, 7)])
+    def test_maps_of_two_floors(self, matcher, seeds):
+        target, source = office_run(seeds[0], 0.0, 0.7, 0.4, 1), office_run(seeds[1], 1.0, 0.3, 1.9, 2)
+        assert_refused(matched(matcher, last_map(target), last_map(source)))
+
+    @pytest.mark.parametrize("seed", [1, 4])
+    def test_maps_of_one_floor_that_do_not_meet(self, matcher, seed):
+        target, source = office_run(seed, 0.0, 0.25, 0.4, 1), office_run(seed, 1.0, 0.75, 1.9, 2)
+        pair = pair_of(target, source)
+        match = matched(matcher, pair.target, pair.source)
+        if match.accepted:
+            assert_right(match, pair)
+
+    @pytest.mark.parametrize("axis", [0, 1])
+    def test_a_mirrored_copy(self, matcher, axis):
+        for grid in (flat(ragged=1), office_pair(1).target):
+            mirrored = Grid(np.flip(grid.cells, axis).copy(), grid.resolution_m)
+            assert_refused(matched(matcher, grid, mirrored))
+
+    @pytest.mark.parametrize("size_m", [(6.0, 6.0), (8.0, 5.0)])
+    def test_a_room_that_looks_the_same_from_the_other_side(self, matcher, size_m):
+        corner = Sim2(-0.5, -0.5)
+        rooms = [
+            drawn(
+                within(0.0, 0.0, *size_m),
+                outline(0.0, 0.0, *size_m),
+                size_m=(size_m[0] + 1, size_m[1] + 1),
+                floor_from_map=corner,
+                ragged=seed,
+            )
+            for seed in (1, 2)
+        ]
+        match = matched(matcher, *rooms)
+        assert_refused(match)
+        assert match.reason.code is ReasonCode.AMBIGUOUS
+        assert match.rivals
+
+    @pytest.mark.parametrize("name", LONG_WALLS)
+    @pytest.mark.parametrize("lengths_m", [(12.0, 12.0), (12.0, 20.0), (24.0, 23.0)])
+    def test_walls_without_an_end(self, matcher, name, lengths_m):
+        """Nothing tells how far the maps are shifted along the walls, though some shift scores highest."""
+        maps = [
+            drawn(
+                within(-99.0, 0.0, 99.0, 6.0),
+                LONG_WALLS[name],
+                size_m=(length_m, 7.0),
+                floor_from_map=Sim2(0.0, -0.5),
+                ragged=seed,
+            )
+            for seed, length_m in enumerate(lengths_m)
+        ]
+        assert_refused(matched(matcher, *maps))
+
+    @pytest.mark.parametrize(("target_bays", "source_bays"), BAYS)
+    def test_a_corridor_that_looks_alike_is_not_placed_a_bay_off(self, matcher, target_bays, source_bays):
+        pair = pair_of(corridor_run(*target_bays, 0.3, 1), corridor_run(*source_bays, 1.1, 2))
+        match = matched(matcher, pair.target, pair.source)
+        assert match.target_from_source is not None
+        position_m, _ = pair.errors(match.target_from_source)
+        assert not match.accepted or position_m < 0.25 * BAY_M
+
+    @pytest.mark.parametrize("name", NEARLY_NOTHING)
+    def test_maps_with_nothing_to_go_by(self, matcher, name):
+        nearly_nothing, map_of_a_flat = NEARLY_NOTHING[name], flat()
+        assert_refused(matched(matcher, nearly_nothing, map_of_a_flat))
+        assert_refused(matched(matcher, map_of_a_flat, nearly_nothing))
+
+    @pytest.mark.parametrize("name", sorted(set(NEARLY_NOTHING) - {"noise"}))
+    def test_maps_with_nothing_to_go_by_and_their_copies(self, matcher, name):
+        nearly_nothing = NEARLY_NOTHING[name]
+        assert_refused(matched(matcher, nearly_nothing, nearly_nothing))

@@ -1,0 +1,158 @@
+"""How the program ends, and what it says then."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from replay import __version__
+from tests import bags
+from tests.bags import write_mcap
+from tests.program import Program, in_process_of_its_own
+from tests.runs import bare_room, growing, in_log_order, seen, two_robots
+
+
+def test_done(replay: Program, two: Path) -> None:
+    ran = replay.merge(two)
+    assert (ran.status, ran.statuses) == (0, {"r1": "reference", "r2": "merged"})
+
+
+def test_the_table_has_a_row_a_robot(replay: Program, tmp_path: Path) -> None:
+    messages = in_log_order(growing("r1"), growing("r2"), [seen("r3", 30.0, bare_room())])
+    ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages))
+    head, *rows = (line.split() for line in ran.out.splitlines())
+    assert head[:2] == ["robot", "status"]
+    assert [row[:2] for row in rows] == [["r1", "reference"], ["r2", "merged"], ["r3", "unmerged"]]
+    assert rows[1][2:5] == ["11.20", "2.31", "126.1"]
+    assert rows[2][2:5] == ["–", "–", "–"]
+    for robot, line in zip(ran.robots.values(), ran.out.splitlines()[1:], strict=True):
+        assert line.rstrip().endswith(robot["reason"]["message"])
+
+
+def test_no_progress_bar_without_a_terminal(replay: Program, two: Path) -> None:
+    ran = replay.merge(two)
+    assert "\x1b" not in ran.out + ran.err
+    assert "━" not in ran.err
+
+
+def test_json_prints_the_report_and_nothing_else(replay: Program, two: Path) -> None:
+    ran = replay.merge(two, "--json")
+    assert ran.out == ran.report_path.read_text(encoding="utf-8")
+    assert json.loads(ran.out)["schema"] == "replay.report/1"
+
+
+def test_require_all(replay: Program, two: Path, tmp_path: Path) -> None:
+    assert replay.merge(two, "--require-all").status == 0
+    other = write_mcap(tmp_path / "run.mcap", [*growing("r1"), seen("r2", 30.0, bare_room())])
+    assert replay.merge(other).status == 0
+    ran = replay.merge(other, "--require-all")
+    assert (ran.status, ran.statuses["r2"]) == (1, "unmerged")
+    assert ran.mcap.exists()
+
+
+def test_require_all_counts_a_robot_without_a_map(replay: Program, tmp_path: Path) -> None:
+    messages = [*growing("r1"), seen("r2", 3.0, resolution=0.0)]
+    ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages), "--require-all")
+    assert (ran.status, ran.statuses["r2"]) == (1, "no_map")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (),
+        ("merge",),
+        ("info",),
+        ("fly", "run.mcap"),
+        ("merge", "run.mcap", "--nonsense"),
+        ("merge", "run.mcap", "--cloc", "log"),
+        ("merge", "run.mcap", "--clock", "sundial"),
+        ("merge", "run.mcap", "--images", "some"),
+    ],
+)
+def test_flags_that_are_none(replay: Program, arguments: tuple[str, ...]) -> None:
+    ran = replay(*arguments)
+    assert ran.status == 2
+    assert "usage: replay" in ran.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("--robots", "r1,,r2"), "--robots r1,,r2: expected names"),
+        (("--robots", "r1,r1"), "each once"),
+        (("--start", "noon"), "'noon' is no time"),
+        (("--stop", "1.2.3"), "'1.2.3' is no number of seconds"),
+        (("--reorder-window", "-1"), "'-1' is no number of seconds"),
+        (("--every", "inf"), "'inf' is no number of seconds"),
+        (("-o", "out.bag"), "ends in .mcap"),
+    ],
+)
+def test_values_that_are_none(replay: Program, two: Path, arguments: tuple[str, ...], expected: str) -> None:
+    ran = replay("merge", two, *arguments)
+    assert ran.status == 2
+    assert expected in ran.error
+    assert not list(replay.folder.iterdir())
+
+
+def test_start_after_stop(replay: Program, two: Path) -> None:
+    ran = replay.merge(two, "--start", "20", "--stop", "10")
+    assert ran.status == 2
+    assert "--stop" in ran.error
+
+
+def test_a_bug_ends_with_a_status_and_a_word(replay: Program, two: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("as a bug would")
+
+    monkeypatch.setattr("replay.pipeline.step", broken)
+    ran = replay.merge(two)
+    assert ran.status == 3
+    assert "ZeroDivisionError" in ran.err
+    assert f"a bug in replay {__version__}" in ran.err.splitlines()[-1]
+    assert not list(replay.folder.iterdir())
+
+
+def test_a_recording_that_is_damaged_in_the_middle(replay: Program, tmp_path: Path) -> None:
+    run = write_mcap(tmp_path / "run.mcap", two_robots())
+    bags.damage(run, bags.chunks(run)[-2])
+    ran = replay.merge(run)
+    assert ran.status == 2
+    assert ran.err.splitlines()[-1].startswith(f"replay: error: {run}: the chunk at byte")
+    assert list(tmp_path.iterdir()) == [run]
+
+
+class TestInfo:
+    def test_says_what_would_be_merged(self, replay: Program, two: Path) -> None:
+        ran = replay("info", two)
+        assert (ran.status, ran.err) == (0, "")
+        assert ran.out.splitlines()[-1] == "would be merged: r2 (/r2/map) into r1 (/r1/map), the reference"
+        assert (
+            replay("info", two, "--robots", "r2")
+            .out.splitlines()[-1]
+            .endswith("nothing else into r2 (/r2/map), the reference")
+        )
+
+    def test_says_why_nothing_would(self, replay: Program, two: Path) -> None:
+        ran = replay("info", two, "--robots", "r9")
+        assert ran.status == 0
+        assert "nothing would be merged: there is no map of robot 'r9'" in ran.out.splitlines()[-1]
+
+    def test_what_is_no_recording(self, replay: Program, tmp_path: Path) -> None:
+        (tmp_path / "notes.txt").write_text("dear diary")
+        for path in ("notes.txt", "nowhere.bag", "."):
+            ran = replay("info", path)
+            assert ran.status == 2
+            assert ran.error
+
+
+def test_as_a_process(two: Path, tmp_path: Path) -> None:
+    done = in_process_of_its_own("merge", two, "--no-rrd", "--images", "none", "--json", cwd=tmp_path)
+    assert (done.returncode, json.loads(done.stdout)["reference"]) == (0, "r1")
+    again = in_process_of_its_own("merge", two, "--no-rrd", cwd=tmp_path)
+    assert (again.returncode, again.stdout, again.stderr.count("\n")) == (2, "", 1)
+
+
+def test_version(replay: Program) -> None:
+    assert replay("--version").out == f"replay {__version__}\n"

@@ -1,0 +1,157 @@
+"""Which files are written, and which are never touched."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.bags import write_mcap, write_rosbag2
+from tests.program import Program
+from tests.runs import two_robots
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(each.name for each in folder.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "stem"),
+    [("run.mcap", "run"), ("floor.2026-05-01.mcap", "floor.2026-05-01"), ("no_suffix", "no_suffix")],
+)
+def test_default_name(replay: Program, two: Path, tmp_path: Path, name: str, stem: str) -> None:
+    folder = tmp_path / "elsewhere"
+    folder.mkdir()
+    shutil.copy(two, folder / name)
+    assert replay("merge", folder / name, "--no-rrd", "--images", "none").status == 0
+    assert names(folder) == [name]
+    assert names(tmp_path) == ["elsewhere", f"{stem}.merged.json", f"{stem}.merged.mcap"]
+
+
+def test_default_name_of_a_folder(replay: Program, tmp_path: Path) -> None:
+    write_rosbag2(tmp_path / "bag.v2", two_robots())
+    assert replay("merge", f"{tmp_path}/bag.v2/", "--no-rrd", "--images", "none").status == 0
+    assert names(tmp_path) == ["bag.v2", "bag.v2.merged.json", "bag.v2.merged.mcap"]
+
+
+def test_default_name_is_that_of_the_first_run(replay: Program, two: Path, tmp_path: Path) -> None:
+    shutil.copy(two, tmp_path / "b.mcap")
+    shutil.copy(two, tmp_path / "a.mcap")
+    choice = ("--topic", "r1=/r1/map", "--topic", "r2=/r2/map")
+    assert replay("merge", "r1=b.mcap", "r2=a.mcap", *choice, "--no-rrd", "--images", "none").status == 0
+    assert "b.merged.mcap" in names(tmp_path)
+
+
+def test_three_files_beside_each_other(replay: Program, two: Path, tmp_path: Path) -> None:
+    ran = replay("merge", two, "-o", "out.mcap")
+    assert ran.status == 0
+    assert names(tmp_path) == ["out.json", "out.mcap", "out.rrd"]
+    assert ran.err.rstrip().endswith("wrote out.mcap, out.rrd, out.json")
+
+
+@pytest.mark.parametrize("name", ["out.mcap", "out.json"])
+def test_what_exists_is_refused_without_force(replay: Program, two: Path, tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("dear to somebody")
+    ran = replay("merge", two, "-o", "out.mcap", "--no-rrd", "--images", "none")
+    assert ran.status == 2
+    assert name in ran.error
+    assert "--force" in ran.error
+    assert names(tmp_path) == [name]
+    assert (tmp_path / name).read_text() == "dear to somebody"
+    assert replay("merge", two, "-o", "out.mcap", "--no-rrd", "--images", "none", "--force").status == 0
+    assert (tmp_path / name).read_bytes()[:8] != b"dear to "
+
+
+def test_a_file_that_is_not_written_may_exist(replay: Program, two: Path, tmp_path: Path) -> None:
+    (tmp_path / "out.rrd").write_text("of another run")
+    assert replay("merge", two, "-o", "out.mcap", "--no-rrd", "--images", "none").status == 0
+    assert (tmp_path / "out.rrd").read_text() == "of another run"
+
+
+def test_a_failed_run_leaves_what_was_there(replay: Program, two: Path) -> None:
+    before = replay.merge(two)
+    kept = before.mcap.read_bytes()
+    ran = replay.merge(two, "--robots", "r1,r9")
+    assert ran.status == 2
+    assert before.mcap.read_bytes() == kept
+    assert names(replay.folder) == ["out.json", "out.mcap"]
+
+
+class TestInputsAreNeverWritten:
+    def test_by_name(self, replay: Program, two: Path, tmp_path: Path) -> None:
+        shutil.copy(two, tmp_path / "run.mcap")
+        (tmp_path / "folder").mkdir()
+        for output in ("run.mcap", "./folder/../run.mcap", tmp_path / "run.mcap"):
+            ran = replay("merge", "run.mcap", "-o", output, "--no-rrd", "--force")
+            assert ran.status == 2
+            assert "is an input" in ran.error
+        assert (tmp_path / "run.mcap").read_bytes() == two.read_bytes()
+
+    def test_through_a_link(self, replay: Program, two: Path, tmp_path: Path) -> None:
+        shutil.copy(two, tmp_path / "run.mcap")
+        (tmp_path / "link.mcap").symlink_to("run.mcap")
+        for run, output in (("run.mcap", "link.mcap"), ("link.mcap", "run.mcap")):
+            assert "is an input" in replay("merge", run, "-o", output, "--no-rrd", "--force").error
+
+    def test_under_the_temporary_name(self, replay: Program, two: Path, tmp_path: Path) -> None:
+        shutil.copy(two, tmp_path / "run.mcap.partial")
+        ran = replay("merge", "run.mcap.partial", "-o", "run.mcap", "--no-rrd", "--force")
+        assert ran.status == 2
+        assert (tmp_path / "run.mcap.partial").read_bytes() == two.read_bytes()
+
+    def test_within_a_bag_folder(self, replay: Program, tmp_path: Path) -> None:
+        bag = write_rosbag2(tmp_path / "bag", two_robots(), "mcap")
+        (part,) = bag.glob("*.mcap")
+        kept = part.read_bytes()
+        for output in (part, bag / "merged.mcap"):
+            ran = replay("merge", bag, "-o", output, "--no-rrd", "--force")
+            assert ran.status == 2
+            assert "input" in ran.error
+        assert part.read_bytes() == kept
+
+
+class TestWhereNothingCanBeWritten:
+    def test_no_folder(self, replay: Program, two: Path, tmp_path: Path) -> None:
+        ran = replay("merge", two, "-o", "nowhere/out.mcap", "--no-rrd")
+        assert ran.status == 3
+        assert "no such folder" in ran.error
+        assert not names(tmp_path)
+
+    def test_a_folder_that_takes_no_files(self, replay: Program, two: Path) -> None:
+        folder = Path("/proc/self")
+        if not folder.is_dir():
+            pytest.skip("a folder that takes no files, whoever asks, is only known on Linux")
+        ran = replay("merge", two, "-o", folder / "out.mcap", "--no-rrd")
+        assert ran.status == 3
+        assert f"{folder}/out.mcap: cannot be written" in ran.error
+
+    @pytest.mark.parametrize("name", ["out.mcap", "out.json", "out.mcap.partial", "out.json.partial"])
+    def test_a_folder_in_the_way(self, replay: Program, two: Path, tmp_path: Path, name: str) -> None:
+        (tmp_path / name).mkdir()
+        ran = replay.merge(two)
+        assert ran.status == 3
+        assert ran.err.splitlines()[-1].startswith("replay: error: ")
+        assert "out." in ran.err.splitlines()[-1]
+        assert names(tmp_path) == [name]
+
+    def test_a_full_disk(self, replay: Program, two: Path, tmp_path: Path) -> None:
+        for name in ("out.mcap.partial", "out.json.partial"):
+            (tmp_path / name).symlink_to("/dev/full")
+            ran = replay.merge(two)
+            assert ran.status == 3
+            assert "No space left" in ran.err.splitlines()[-1]
+            assert not names(tmp_path)
+
+
+def test_nothing_is_written_before_the_recording_was_understood(replay: Program, tmp_path: Path) -> None:
+    (tmp_path / "broken.mcap").write_bytes(b"not at all")
+    assert replay("merge", "broken.mcap", "--no-rrd").status == 2
+    assert names(tmp_path) == ["broken.mcap"]
+
+
+def test_a_run_into_a_folder_of_its_own(replay: Program, tmp_path: Path) -> None:
+    write_mcap(tmp_path / "run.mcap", two_robots())
+    (tmp_path / "out").mkdir()
+    assert replay("merge", "run.mcap", "-o", "out/floor.mcap", "--no-rrd", "--images", "none").status == 0
+    assert names(tmp_path / "out") == ["floor.json", "floor.mcap"]

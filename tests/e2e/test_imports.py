@@ -1,0 +1,57 @@
+"""What is imported when: `--help` starts fast, and `mapmerge` stands alone."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from tests.data_paths import ROOT
+
+HEAVY = {"numpy", "cv2", "rosbags", "mcap", "rerun", "rich", "ruamel", "lz4", "zstandard"}
+_LOADED = "import sys; print('\\n'.join(sorted({name.partition('.')[0] for name in sys.modules})), file=sys.stderr)"
+
+
+def loaded(code: str) -> set[str]:
+    """Return the packages that are loaded after this code, in a process of its own."""
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}\n{_LOADED}"], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    return set(done.stderr.split())
+
+
+@pytest.mark.parametrize("arguments", [("--help",), ("merge", "--help"), ("info", "--help"), ("--version",), ("fly",)])
+def test_help_imports_nothing_heavy(arguments: tuple[str, ...]) -> None:
+    code = (
+        "import contextlib, io\nfrom replay.cli import main\n"
+        "with contextlib.suppress(SystemExit), contextlib.redirect_stderr(io.StringIO()):\n"
+        f"    main({list(arguments)})"
+    )
+    assert not loaded(code) & HEAVY
+
+
+def test_mapmerge_stands_alone() -> None:
+    assert not loaded("import mapmerge") & {"replay", "rosbags", "mcap", "rerun", "rich"}
+
+
+def test_mapmerge_works_where_nothing_else_is_installed() -> None:
+    blocked = sorted({"replay", "rosbags", "mcap", "rerun", "rich", "ruamel"})
+    loaded(
+        f"import sys\nfor name in {blocked}: sys.modules[name] = None\n"
+        "import numpy as np\nfrom mapmerge import Grid, MergeConfig, MergeState, step\n"
+        "grid = Grid(np.zeros((9, 9), np.int8), 0.1)\n"
+        "step(MergeState.initial(['a', 'b']), {'a': grid, 'b': grid}, MergeConfig())"
+    )
+
+
+def test_merging_without_a_rerun_recording_imports_no_rerun(tmp_path_factory: pytest.TempPathFactory) -> None:
+    folder = tmp_path_factory.mktemp("out")
+    run = ROOT / "samples" / "two_robots.mcap"
+    code = (
+        "import contextlib, io\nfrom replay.cli import main\n"
+        "with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):\n"
+        f"    main(['merge', {str(run)!r}, '-o', {str(folder / 'out.mcap')!r}, '--no-rrd', '--stop', '1'])"
+    )
+    assert "rerun" not in loaded(code)

@@ -1,0 +1,67 @@
+"""A matcher whose answers a test decides."""
+
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mapmerge.config import MergeConfig
+from mapmerge.grid import Grid
+from mapmerge.match import MATCHERS, Match
+from mapmerge.reasons import Reason, ReasonCode
+from mapmerge.sim2 import IDENTITY, Sim2
+from mapmerge.verify import Scores
+
+
+class ScriptedMatcher:
+    """Knows maps by the value that fills them, and counts what it is asked."""
+
+    config = MergeConfig(method="scripted")
+
+    def __init__(self):
+        self.answers = {}
+        self.prepared = []
+        self.matched = []
+
+    def map_of(self, value, resolution_m=0.05):
+        return Grid(np.full((20, 20), value, np.int8), resolution_m)
+
+    def fits(self, target, source, pose=IDENTITY, score_m=50.0):
+        """From now on, the map filled with ``source`` lies at ``pose`` on that filled with ``target``."""
+        reason = Reason(ReasonCode.ACCEPTED, f"{source} fits {target}")
+        self.answers[target, source] = Match(pose, self.scores(score_m), accepted=True, reason=reason)
+
+    def misfits(self, target, source, score_m=5.0, code=ReasonCode.WALLS_DISAGREE):
+        reason = Reason(code, f"{source} does not fit {target}")
+        self.answers[target, source] = Match(Sim2(), self.scores(score_m), accepted=False, reason=reason)
+
+    @staticmethod
+    def scores(score_m):
+        return Scores(score_m, 0.5, 20.0, 0.25, 0.5, 10.0, 10.0)
+
+    def prepare(self, grid, resolution_m, config):
+        assert config is self.config
+        self.prepared.append((int(grid.cells[0, 0]), resolution_m))
+        return self.prepared[-1]
+
+    def match(self, target, source, config):
+        assert config is self.config
+        assert target[1] == source[1]
+        pair = target[0], source[0]
+        self.matched.append(pair)
+        nothing = Reason(ReasonCode.NO_CANDIDATE, f"nothing is known of {pair}")
+        return self.answers.get(pair, Match(None, None, accepted=False, reason=nothing))
+
+    def calls(self):
+        """Return what was matched since the last call."""
+        matched, self.matched = self.matched, []
+        return matched
+
+
+@pytest.fixture
+def scripted(monkeypatch):
+    matcher = ScriptedMatcher()
+    monkeypatch.setitem(sys.modules, "scripted_matcher", SimpleNamespace(Scripted=lambda: matcher))
+    monkeypatch.setitem(MATCHERS, "scripted", "scripted_matcher:Scripted")
+    return matcher

@@ -1,0 +1,72 @@
+"""Settings: what is refused, and where the classes of cells begin."""
+
+import math
+
+import pytest
+
+from mapmerge.config import CellConfig, MergeConfig, RefineConfig, SearchConfig, VerifyConfig
+from mapmerge.errors import ConfigError, GridError, MapMergeError
+
+
+def test_errors_form_one_tree():
+    assert issubclass(ConfigError, MapMergeError)
+    assert issubclass(GridError, MapMergeError)
+    assert issubclass(MapMergeError, ValueError)
+
+
+class TestNumbers:
+    @pytest.mark.parametrize("value", [-0.001, math.nan, math.inf, -math.inf])
+    @pytest.mark.parametrize(
+        ("settings", "name"),
+        [
+            (CellConfig, "p_free"),
+            (SearchConfig, "cell_m"),
+            (SearchConfig, "free_weight"),
+            (RefineConfig, "iterations"),
+            (VerifyConfig, "min_margin"),
+            (MergeConfig, "moved_rad"),
+        ],
+    )
+    def test_negative_or_not_finite_is_refused_and_named(self, settings, name, value):
+        with pytest.raises(ConfigError, match=name):
+            settings(**{name: value})
+
+    @pytest.mark.parametrize("name", ["wall_spacing_m", "angle_step_rad", "cell_m"])
+    def test_what_is_divided_by_must_be_positive(self, name):
+        with pytest.raises(ConfigError, match=name):
+            SearchConfig(**{name: 0})
+
+    @pytest.mark.parametrize("reject_m", [(0.8, -0.1), (math.nan,), (0.4, math.inf), (0.0,)])
+    def test_distances_of_a_sequence_are_checked_one_by_one(self, reject_m):
+        with pytest.raises(ConfigError, match="reject_m"):
+            RefineConfig(reject_m=reject_m)
+
+    def test_zero_is_a_fine_threshold(self):
+        assert VerifyConfig(min_overlap_m2=0.0, min_matched_wall_m=0, min_margin=0.0).min_margin == 0.0
+        assert SearchConfig(free_weight=0.0, working_cell_m=0.0).free_weight == 0.0
+
+
+class TestCells:
+    def test_occupied_from_65_and_free_up_to_25(self):
+        config = CellConfig()
+        assert (config.min_occupied_percent, config.max_free_percent) == (65, 25)
+
+    @pytest.mark.parametrize("percent", range(101))
+    def test_whole_percents_are_exact(self, percent):
+        """0.29 × 100 is 28.999999999999996."""
+        if percent > 0:
+            assert CellConfig(p_occupied=percent / 100, p_free=0.0).min_occupied_percent == percent
+        if percent < 100:
+            assert CellConfig(p_occupied=1.0, p_free=percent / 100).max_free_percent == percent
+
+    @pytest.mark.parametrize(
+        ("p_occupied", "p_free", "percents"), [(0.655, 0.255, (66, 25)), (0.501, 0.499, (51, 49)), (1.0, 0.0, (100, 0))]
+    )
+    def test_between_two_percents_the_class_begins_at_the_next(self, p_occupied, p_free, percents):
+        config = CellConfig(p_occupied, p_free)
+        assert (config.min_occupied_percent, config.max_free_percent) == percents
+
+    @pytest.mark.parametrize(("p_occupied", "p_free"), [(0.5, 0.5), (0.3, 0.6), (1.01, 0.2), (0.0, 0.0)])
+    def test_classes_may_not_touch_or_leave_the_range(self, p_occupied, p_free):
+        with pytest.raises(ConfigError, match="p_free < p_occupied"):
+            CellConfig(p_occupied, p_free)

@@ -1,0 +1,98 @@
+"""What a map is turned into before it is matched."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mapmerge.grid import Grid
+from mapmerge.prepare import CELL_FREE, CELL_OCCUPIED, CELL_UNKNOWN, prepare, thinned
+from mapmerge.sim2 import Sim2
+from tests.floors import CONFIG, filled, flat, prepared_map
+
+
+class TestClasses:
+    def test_65_is_occupied_and_25_is_free(self):
+        cells = np.array([[65, 64, 26, 25, 0, 100, -1]], np.int8)
+        prepared = prepare(Grid(np.vstack([cells, np.zeros_like(cells)]), 0.5), 0.5, CONFIG)
+        margin = prepared.margin
+        expected = [CELL_OCCUPIED, CELL_UNKNOWN, CELL_UNKNOWN, CELL_FREE, CELL_FREE, CELL_OCCUPIED, CELL_UNKNOWN]
+        assert prepared.classes[margin, margin:-margin].tolist() == expected
+        assert (prepared.classes[:margin] == CELL_UNKNOWN).all()
+
+    def test_outside_is_unknown_and_far_from_walls(self):
+        prepared = prepared_map(filled(100, 20, 20))
+        outside = np.array([[-50.0, 0.5], [0.5, 80.0], [1.0, -1.2], [1e6, 1e6]])
+        index = prepared.flat_index(outside)
+        assert (prepared.classes.ravel()[index] == CELL_UNKNOWN).all()
+        assert (prepared.wall_distance_m.ravel()[index] >= 1.0).all()
+
+
+class TestWalls:
+    def test_distances_and_nearest_walls_are_those_of_a_search(self):
+        prepared = prepared_map(flat(Sim2(-1.0, -1.0, 0.3)))
+        rng = np.random.default_rng(0)
+        points_m = rng.uniform(0.0, prepared.extent_m, (300, 2))
+        index = prepared.flat_index(points_m)
+        centres_m = (np.floor(points_m / 0.05) + 0.5) * 0.05
+        away_m = np.hypot(*(centres_m[:, None] - prepared.wall_cells_m[None]).transpose(2, 0, 1))
+        np.testing.assert_allclose(prepared.wall_distance_m.ravel()[index], away_m.min(axis=1), rtol=0.03, atol=1e-6)
+        nearest = prepared.nearest_wall.ravel()[index]
+        np.testing.assert_allclose(away_m[np.arange(300), nearest], away_m.min(axis=1), rtol=0.05, atol=1e-6)
+
+    def test_cells_are_where_the_grid_has_them(self):
+        grid = flat(Sim2(-1.0, -1.0, 0.3))
+        prepared = prepared_map(grid)
+        in_map = prepared.grid.map_from_grid.apply(prepared.wall_cells_m)
+        np.testing.assert_allclose(in_map, grid.centres_m(grid.cells >= 65), atol=1e-9)
+
+    def test_a_metre_of_wall_weighs_about_the_same_at_every_resolution(self):
+        """Of cells, there are four times as many at 0.05 m as at 0.1 m."""
+        weights = [
+            len(prepared_map(flat(Sim2(-1.0, -1.0, 0.3), resolution_m=resolution_m)).walls_m)
+            for resolution_m in (0.05, 0.08, 0.1)
+        ]
+        assert max(weights) < 1.7 * min(weights)
+
+    def test_free_points_weigh_the_area(self):
+        prepared = prepared_map(flat())
+        free_m2 = (prepared.grid.cells == 0).sum() * 0.05**2
+        assert len(prepared.free_m) * 0.25**2 == pytest.approx(free_m2, rel=0.03)
+
+
+class TestThinned:
+    def test_one_mean_point_for_each_square(self):
+        points = np.array([[0.01, 0.01], [0.09, 0.05], [0.11, 0.01], [-0.05, 0.31]])
+        found = thinned(points, 0.1)
+        assert sorted(map(tuple, found.round(6).tolist())) == [(-0.05, 0.31), (0.05, 0.03), (0.11, 0.01)]
+
+    def test_none(self):
+        assert thinned(np.empty((0, 2)), 0.1).shape == (0, 2)
+
+    def test_does_not_depend_on_the_order(self):
+        points = np.random.default_rng(1).uniform(-5.0, 5.0, (500, 2))
+        np.testing.assert_allclose(thinned(points, 0.4), thinned(points[::-1], 0.4), atol=1e-12)
+
+
+class TestDegenerate:
+    @pytest.mark.parametrize(
+        "grid",
+        [
+            filled(0, 0, 0),
+            filled(-1, 30, 40),
+            filled(0, 30, 40),
+            filled(100, 30, 40),
+            filled(100, 1, 1),
+            filled(0, 1, 1),
+            filled(100, 1, 200),
+            filled(100, 200, 1),
+            filled(100, 3, 3, resolution_m=5.0),
+        ],
+    )
+    @pytest.mark.parametrize("coarser", [1.0, 1.6, 10.0])
+    def test_has_an_outcome(self, grid, coarser):
+        prepared = prepare(grid, grid.resolution_m * coarser, CONFIG)
+        assert prepared.classes.shape == prepared.wall_distance_m.shape == prepared.nearest_wall.shape
+        assert len(prepared.wall_cells_m) == (prepared.classes == CELL_OCCUPIED).sum()
+        assert not np.isnan(prepared.wall_distance_m).any()
+        assert math.prod(prepared.extent_m) >= 0.0

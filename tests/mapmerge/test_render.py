@@ -1,0 +1,98 @@
+"""Pictures of evidence: their form, whatever they show."""
+
+import numpy as np
+import pytest
+
+from mapmerge.evidence import Curve, CurvesEvidence, OverlayEvidence, SurfaceEvidence
+from mapmerge.grid import Grid
+from mapmerge.render import MAX_SIDE_PX, render
+from mapmerge.sim2 import IDENTITY, Sim2
+from tests.floors import filled, flat, prepared_map
+
+RNG = np.random.default_rng(0)
+RAMP = np.linspace(-1.0, 1.0, 180)
+
+
+def curves(*values, marks=(10.0, 90.0)):
+    named = tuple(Curve(f"curve {number}", each) for number, each in enumerate(values))
+    return CurvesEvidence("curves", "Some curves", "angle [°]", 0.0, 180.0, named, marks)
+
+
+def surface(values, marks=(), chosen=None):
+    return SurfaceEvidence("surface", "A surface", np.asarray(values, np.float32), marks, chosen)
+
+
+def overlay(target, source, pose=IDENTITY):
+    return OverlayEvidence("overlay", "Two maps", prepared_map(target), prepared_map(source), pose, 0.15)
+
+
+CASES = {
+    "three curves": curves(RAMP, RAMP**2, -RAMP),
+    "one flat curve": curves(np.zeros(180), marks=()),
+    "five curves": curves(*[RAMP] * 5),
+    "one value": curves(np.ones(1)),
+    "a surface": surface(RNG.normal(size=(120, 200)), ((3, 4), (119, 199)), (60, 100)),
+    "a flat surface": surface(np.zeros((30, 30))),
+    "a large surface": surface(RNG.normal(size=(3000, 50)), ((0, 0),), (2999, 49)),
+    "one row": surface(RNG.normal(size=(1, 400)), ((0, 3),), (0, 399)),
+    "one column": surface(RNG.normal(size=(2000, 1)), ((3, 0),)),
+    "an overlay": overlay(flat(), flat(ragged=1), Sim2(0.3, 0.2, 0.1)),
+    "far apart": overlay(flat(), flat(), Sim2(90.0, 5.0, 0.1)),
+    "without a wall": overlay(flat(), filled(0, 50, 40)),
+    "nothing known": overlay(filled(-1, 5, 5), filled(0, 0, 0)),
+    "one cell": overlay(filled(100, 1, 1), filled(100, 1, 1)),
+    "long and thin": overlay(filled(100, 1, 4000), filled(100, 1, 4000)),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_pictures_are_rgb_and_not_too_large(name):
+    picture = render(CASES[name])
+    assert picture.rgb.dtype == np.uint8
+    assert picture.rgb.ndim == 3
+    assert picture.rgb.shape[2] == 3
+    assert 0 < max(picture.rgb.shape) <= MAX_SIDE_PX
+    assert min(picture.rgb.shape) > 0
+    assert (picture.step, picture.title) == (CASES[name].step, CASES[name].title)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_pictures_repeat_themselves(name):
+    assert np.array_equal(render(CASES[name]).rgb, render(CASES[name]).rgb)
+
+
+def colours(picture):
+    return set(map(tuple, picture.rgb.reshape(-1, 3).tolist()))
+
+
+def test_an_overlay_tells_walls_that_agree_from_those_that_do_not():
+    good, bad = colours(render(overlay(flat(), flat()))), colours(render(overlay(flat(), flat(), Sim2(0.4, 0.4))))
+    green, red = (20, 150, 60), (220, 30, 40)
+    assert green in good
+    assert red not in good
+    assert red in bad
+
+
+def test_up_is_up():
+    """A target with a wall high up in the map."""
+    cells = np.zeros((200, 200), np.int8)
+    cells[150:155] = 100
+    picture = render(overlay(Grid(cells, 0.05), filled(0, 200, 200)))
+    red_rows = np.flatnonzero((picture.rgb == (220, 30, 40)).all(axis=2).any(axis=1))
+    assert red_rows.mean() < picture.rgb.shape[0] / 2
+
+
+def test_what_is_free_in_both_maps_is_lighter_and_in_its_place():
+    """The source covers the lower part of the target."""
+    rgb = render(overlay(filled(0, 200, 200), filled(0, 80, 200))).rgb
+    white_rows = np.flatnonzero((rgb[100:] == 255).all(axis=2).mean(axis=1) > 0.5) + 100
+    assert white_rows.mean() > 0.6 * rgb.shape[0]
+    assert len(white_rows) == pytest.approx(80 * 2, abs=3)
+
+
+def test_the_chosen_shift_is_marked_where_it_is():
+    picture = render(surface(np.zeros((100, 100)), chosen=(20, 70)))
+    rows, cols = np.nonzero((picture.rgb == (214, 39, 40)).all(axis=2))
+    zoom = picture.rgb.shape[0] / 100
+    assert cols.mean() == pytest.approx(70.5 * zoom, abs=2)
+    assert rows.mean() == pytest.approx((99.5 - 20) * zoom, abs=2)

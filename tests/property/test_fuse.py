@@ -1,0 +1,123 @@
+"""Laws of fusion."""
+
+import math
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from mapmerge import fuse as fuse_module
+from mapmerge.config import CellConfig
+from mapmerge.fuse import Layer, fuse
+from mapmerge.grid import Grid
+from mapmerge.sim2 import IDENTITY, Sim2
+
+CELLS = CellConfig()
+values = st.integers(-1, 100)
+shapes = st.tuples(st.integers(1, 12), st.integers(1, 12))
+cells = hnp.arrays(np.int8, shapes, elements=values)
+poses = st.builds(Sim2, st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-4.0, 4.0))
+resolutions = st.sampled_from([0.1, 0.05, 0.08, 0.2, 0.03])
+grids = st.builds(Grid, cells, st.just(0.1), poses)
+LATTICE = Grid(np.zeros((1, 1), np.int8), 0.1)
+HALF_A_CELL_OFF = Layer(Grid(np.zeros((3, 1), np.int8), 0.1), Sim2(y_m=0.25))
+FINER = Layer(Grid(np.diag(np.array([1, 0, 0, 1], np.int8)) - np.int8(1), 0.09), IDENTITY)
+TURNED_LATTICE = Grid(np.zeros((1, 1), np.int8), 0.1, Sim2(0.03, 0.02, 1.0))
+layers = st.lists(st.builds(Layer, st.builds(Grid, cells, resolutions, poses), poses), min_size=1, max_size=4)
+
+
+def entropy(p):
+    return -(p * math.log(p) + (1 - p) * math.log(1 - p))
+
+
+def papers_filter(first, second):
+    """Equations 12 to 14 for two known cells, in percent: of p1, p2 and the combined p, that of the lowest entropy.
+
+    None where the filter cannot choose between occupied and free.
+    """
+    p1, p2 = (min(max(value / 100, 0.01), 0.99) for value in (first, second))
+    odds = math.log(p1 / (1 - p1)) + math.log(p2 / (1 - p2))
+    choices = (p1, p2, 1 / (1 + math.exp(-odds)))
+    lowest = min(map(entropy, choices))
+    kept = [p for p in choices if math.isclose(entropy(p), lowest, abs_tol=1e-9)]
+    if max(kept) - min(kept) > 1e-6 or math.isclose(kept[0], 0.5):
+        return None
+    return 100 * kept[0]
+
+
+@pytest.mark.parametrize("first", range(-1, 101))
+def test_two_maps_are_fused_by_the_papers_entropy_filter(first):
+    row = np.arange(-1, 101, dtype=np.int8)[None]
+    # a cell on either side that both know keeps the maps' borders where they are
+    pair = [Grid(np.pad(line, ((0, 0), (1, 1))), 0.1) for line in (row, np.full_like(row, first))]
+    merged = fuse([Layer(grid, IDENTITY) for grid in pair], pair[0], CELLS).grid.cells[0, 1:-1].tolist()
+    for second, value in zip(range(-1, 101), merged, strict=True):
+        if min(first, second) < 0:
+            assert value == max(first, second)
+            continue
+        papers = papers_filter(first, second)
+        assert value == -1 if papers is None else abs(value - papers) <= 0.5 + 1e-4
+
+
+@given(layers, grids, st.randoms())
+def test_the_order_of_the_maps_does_not_matter(placed, lattice, random):
+    order = list(range(len(placed)))
+    random.shuffle(order)
+    first = fuse(placed, lattice, CELLS)
+    second = fuse([placed[index] for index in order], lattice, CELLS)
+    assert second.grid.same_as(first.grid)
+    assert second.agreements == tuple(first.agreements[index] for index in order)
+
+
+@given(layers, grids)
+@example([FINER], TURNED_LATTICE)
+def test_no_cell_comes_from_nowhere(placed, lattice):
+    """A merged cell that is known has a known cell of a map within a diagonal of the coarser one's cells."""
+    merged = fuse(placed, lattice, CELLS).grid
+    points_m = merged.centres_m(merged.known)
+    nearest_m = np.full(len(points_m), np.inf)
+    for layer in placed:
+        known_m = layer.merged_from_map.apply(layer.grid.centres_m(layer.grid.known))
+        if len(known_m) and len(points_m):
+            away_m = np.hypot(*(points_m[:, None] - known_m[None]).transpose(2, 0, 1)).min(axis=1)
+            reach_m = math.sqrt(2) * max(layer.grid.resolution_m, lattice.resolution_m)
+            nearest_m = np.minimum(nearest_m, away_m - reach_m)
+    assert (nearest_m <= 1e-9).all()
+
+
+@given(layers, grids)
+def test_values_stay_in_range_and_agreements_are_shares(placed, lattice):
+    fusion = fuse(placed, lattice, CELLS)
+    assert np.isin(fusion.grid.cells, np.arange(-1, 101)).all()
+    for agreement in fusion.agreements:
+        assert 0.0 <= agreement.acceptance <= 1.0
+        assert 0.0 <= agreement.overlap_fraction <= 1.0
+        assert agreement.overlap_m2 >= 0.0
+
+
+@given(layers, grids, st.integers(1, 9))
+@example([HALF_A_CELL_OFF], LATTICE, 1)
+def test_tiles_do_not_matter(placed, lattice, tile):
+    whole = fuse(placed, lattice, CELLS)
+    with patch.object(fuse_module, "_TILE_CELLS", tile):
+        tiled = fuse(placed, lattice, CELLS)
+    assert tiled.grid.same_as(whole.grid)
+    assert tiled.agreements == whole.agreements
+
+
+@given(grids)
+def test_a_map_alone_is_itself(grid):
+    merged = fuse([Layer(grid, IDENTITY)], grid, CELLS).grid
+    np.testing.assert_array_equal(merged.cells, grid.cropped_to_known().cells)
+
+
+@given(grids, st.integers(2, 5))
+def test_copies_of_a_map_agree(grid, count):
+    fusion = fuse([Layer(grid, IDENTITY)] * count, grid, CELLS)
+    has_classed = ((grid.cells >= 65) | ((grid.cells >= 0) & (grid.cells <= 25))).any()
+    for agreement in fusion.agreements:
+        assert agreement.acceptance == (1.0 if has_classed else 0.0)
+        assert agreement.overlap_m2 == pytest.approx(grid.known_area_m2)

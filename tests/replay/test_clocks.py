@@ -1,0 +1,124 @@
+from __future__ import annotations
+
+import pytest
+
+from replay.clocks import Probe, clock_of, frames, offsets_ns, probe
+from replay.errors import UsageError
+from replay.events import Clock
+from replay.selection import Selected
+from tests.bags import SECOND, START, Recorded
+from tests.fakes import FakeSource
+from tests.runs import at, bad_messages, seen
+
+DAY_S = 86_400
+
+
+def probed(messages: list[Recorded], **options) -> Probe | None:
+    choice = options.pop("choice", "header")
+    return probe(FakeSource(messages, **options), 3, Selected("r1", "/r1/map", (3,)), choice)
+
+
+def known(robot: str, first_s: float, last_s: float | None = None, index: int = 0, clock: Clock = "header") -> Probe:
+    last_s = first_s + 10.0 if last_s is None else last_s
+    return Probe(robot, index, clock, round(first_s * SECOND), round(last_s * SECOND), "map")
+
+
+class TestProbe:
+    def test_header(self) -> None:
+        found = probed([seen("r1", 5.0, stamp_ns=7 * SECOND, frame="/odom"), seen("r1", 25.0)])
+        assert found == Probe("r1", 3, "header", 7 * SECOND, 27 * SECOND, "/odom")
+
+    @pytest.mark.parametrize("stamp_ns", [0, -SECOND])
+    def test_log_where_the_header_has_no_time(self, stamp_ns: int) -> None:
+        found = probed([seen("r1", 5.0, stamp_ns=stamp_ns), seen("r1", 25.0)])
+        assert found is not None
+        assert (found.clock, found.first_ns, found.last_ns) == ("log", at(5.0), at(25.0))
+
+    def test_log_if_told(self) -> None:
+        found = probed([seen("r1", 5.0, stamp_ns=7)], choice="log")
+        assert found is not None
+        assert (found.clock, found.first_ns) == ("log", at(5.0))
+
+    def test_no_clock(self) -> None:
+        assert probed([seen("r1", 0.0)], has_clock=False) == Probe("r1", 3, "none", None, None, "map")
+
+    def test_the_first_message_that_can_be_used(self) -> None:
+        found = probed([*bad_messages("r1", 0.0).values(), seen("r1", 30.0)])
+        assert found is not None
+        assert found.first_ns == at(30.0)
+
+    def test_nothing_that_can_be_used(self) -> None:
+        assert probed(list(bad_messages("r1", 0.0).values())) is None
+
+
+@pytest.mark.parametrize(
+    ("clocks", "expected"),
+    [
+        ((), "header"),
+        (("none",), "none"),
+        (("header", "none"), "header"),
+        (("header", "header"), "header"),
+        (("header", "log"), "log"),
+        (("log", "none"), "log"),
+    ],
+)
+def test_clock_of_one_robot(clocks: tuple[Clock, ...], expected: Clock) -> None:
+    assert clock_of([known("r1", 0.0, clock=clock) for clock in clocks]) == expected
+
+
+@pytest.mark.parametrize(
+    ("recorded", "expected"),
+    [
+        ({"a": "map", "b": "map"}, ["a/map", "b/map"]),
+        ({"a": "map", "b": "odom"}, ["map", "odom"]),
+        ({"a": "/map", "b": "odom"}, ["map", "odom"]),
+        ({"a": "//x/y", "b": "x"}, ["x/y", "x"]),
+        ({"a": "", "b": "map"}, ["a/map", "map"]),
+        ({"a": "merged", "b": "map"}, ["a/merged", "map"]),
+        ({"a": "map", "b": "map", "c": "a/map"}, ["a/map", "b/map", "c/a/map"]),
+    ],
+)
+def test_frames(recorded: dict[str, str], expected: list[str]) -> None:
+    assert list(frames(list(recorded), recorded, "merged").values()) == expected
+
+
+def test_frame_of_a_robot_without_a_map() -> None:
+    assert frames(["a", "b"], {"a": "map"}, "merged") == {"a": "map", "b": "b/map"}
+
+
+class TestOffsets:
+    def test_none_where_clocks_may_be_the_same(self) -> None:
+        probes = [known("r1", START / SECOND), known("r2", START / SECOND + DAY_S - 1.0, index=1)]
+        assert offsets_ns("r1", probes, align_starts=False) == {(0, "r1"): 0, (1, "r2"): 0}
+
+    @pytest.mark.parametrize("gap_s", [DAY_S + 1.0, -DAY_S - 1.0, 1.7e9])
+    def test_refused_where_they_cannot(self, gap_s: float) -> None:
+        first_s = 2 * DAY_S + 100.0
+        other_s = first_s + 10.0 + gap_s if gap_s > 0 else first_s - 10.0 + gap_s
+        probes = [known("r1", first_s), known("r2", other_s, index=1)]
+        for reference in ("r1", "r2"):
+            with pytest.raises(UsageError, match=r"r[12] .* days? apart .* --align-starts"):
+                offsets_ns(reference, probes, align_starts=False)
+
+    def test_a_long_recording_may_reach_the_other(self) -> None:
+        probes = [known("r1", 0.0, 3 * DAY_S), known("r2", 3.5 * DAY_S, index=1)]
+        assert set(offsets_ns("r1", probes, align_starts=False).values()) == {0}
+
+    def test_aligned(self) -> None:
+        probes = [known("r1", 1e9), known("r2", 5.0, index=1), known("r3", 7.0, index=1), known("r4", 2e9, index=2)]
+        assert offsets_ns("r1", probes, align_starts=True) == {
+            (0, "r1"): 0,
+            (1, "r2"): (10**9 - 5) * SECOND,
+            (1, "r3"): (10**9 - 5) * SECOND,
+            (2, "r4"): -(10**9) * SECOND,
+        }
+
+    def test_saved_maps_have_none(self) -> None:
+        saved = Probe("old", 1, "none", None, None, "map")
+        assert offsets_ns("r1", [known("r1", 1e9), saved], align_starts=False) == {(0, "r1"): 0}
+        assert offsets_ns("old", [saved], align_starts=True) == {}
+
+    def test_a_reference_without_a_time_follows_the_first_that_has(self) -> None:
+        saved = Probe("old", 2, "none", None, None, "map")
+        probes = [saved, known("r1", 1e9), known("r2", 5.0, index=1)]
+        assert offsets_ns("old", probes, align_starts=True)[1, "r2"] == (10**9 - 5) * SECOND

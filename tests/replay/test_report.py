@@ -1,0 +1,162 @@
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib import resources
+from typing import Any
+
+import jsonschema
+import pytest
+
+from mapmerge.config import MergeConfig
+from mapmerge.fuse import Agreement
+from mapmerge.grid import Grid
+from mapmerge.merger import MergeResult, MergeState, RobotOutcome, Status, step
+from mapmerge.reasons import Reason, ReasonCode
+from mapmerge.sim2 import Sim2
+from replay.errors import BadMessage
+from replay.events import Report, RobotInput, SkipCause, Skipped
+from replay.report import ReportBuilder
+from tests.runs import bare_room, begun_anew, flat_map, is_right, reference_from
+
+ROBOTS = ("r1", "r2", "r3")
+INPUT: Mapping[str, Any] = {
+    "name": "run.mcap",
+    "format": "mcap",
+    "size_bytes": 5,
+    "robots": list(ROBOTS),
+    "clocks": dict.fromkeys(ROBOTS, "header"),
+    "offsets_ns": dict.fromkeys(ROBOTS, 0),
+    "messages": None,
+    "late": None,
+    "sha256": None,
+}
+
+
+def builder(robots: tuple[str, ...] = ROBOTS) -> ReportBuilder:
+    inputs = [RobotInput(robot, f"/{robot}/map", f"{robot}/map", "header", (0,), 3) for robot in robots]
+    return ReportBuilder(inputs, {"merge": {}}, "1.2.3")
+
+
+def reported(*steps: Mapping[str, Grid], robots: tuple[str, ...] = ROBOTS) -> list[Report]:
+    """Return the report after each step, all checked against the schema."""
+    report, state, found = builder(robots), MergeState.initial(robots), []
+    for stamp_ns, grids in enumerate(steps):
+        state, result = step(state, grids, MergeConfig())
+        report.take(stamp_ns, result)
+        found.append(report.build(stamp_ns, result, [INPUT]))
+        validate(found[-1])
+    return found
+
+
+def validate(report: Report) -> None:
+    schema = json.loads(resources.files("replay").joinpath("schemas/report.schema.json").read_text("utf-8"))
+    jsonschema.Draft202012Validator(schema).validate(json.loads(json.dumps(report, allow_nan=False)))
+
+
+def test_before_any_map() -> None:
+    report = builder().build(None, MergeState.initial(ROBOTS).result, [INPUT])
+    validate(report)
+    assert (report["schema"], report["version"], report["stamp_ns"]) == ("replay.report/1", "1.2.3", None)
+    assert (report["reference"], report["updates"]) == ("r1", 0)
+    for robot in report["robots"].values():
+        assert robot["status"] == robot["reason"]["code"] == "no_map"
+        absent = {"merged_from_map", "acceptance", "overlap_m2", "overlap_fraction", "confidence", "component"}
+        assert {robot[name] for name in absent | {"component_from_map", "placed_via", "first_merged_stamp_ns"}} == {
+            None
+        }
+
+
+def test_a_run() -> None:
+    waiting, alone, merged = reported({"r2": flat_map("r2")}, {"r1": flat_map("r1", 2.0)}, {"r1": flat_map("r1")})
+    assert waiting["robots"]["r2"]["status"] == "unmerged"
+    assert waiting["robots"]["r2"]["reason"]["code"] == "no_reference_map"
+    assert waiting["robots"]["r2"]["component"] == "r2"
+    assert alone["robots"]["r1"]["status"] == "reference"
+    assert alone["robots"]["r1"]["merged_from_map"] == {"x_m": 0.0, "y_m": 0.0, "yaw_rad": 0.0, "scale": 1.0}
+    found = merged["robots"]["r2"]
+    assert (found["status"], found["placed_via"], found["component"]) == ("merged", "r1", "r1")
+    assert is_right(found["merged_from_map"], reference_from("r2"))
+    assert found["component_from_map"] == found["merged_from_map"]
+    assert found["first_merged_stamp_ns"] == 2
+    assert (found["map_frame"], found["map_topic"]) == ("r2/map", "/r2/map")
+    assert [merged["updates"], *(robot["updates"] for robot in merged["robots"].values())] == [3, 2, 1, 0]
+
+
+def test_history() -> None:
+    steps = [
+        {"r1": flat_map("r1"), "r2": flat_map("r2")},
+        {"r2": begun_anew(flat_map("r2"))},
+        {"r2": bare_room()},
+        {"r2": flat_map("r2")},
+    ]
+    reports = reported(*steps)
+    events = [(change["stamp_ns"], change["robot"], change["event"]) for change in reports[-1]["history"]]
+    assert events == [(0, "r2", "placed"), (1, "r2", "moved"), (2, "r2", "withdrawn"), (3, "r2", "placed")]
+    assert [len(report["history"]) for report in reports] == [1, 2, 3, 4]
+    assert reports[-1]["robots"]["r2"]["first_merged_stamp_ns"] == 0
+
+
+def test_pairs() -> None:
+    (report,) = reported({robot: flat_map(robot) for robot in ROBOTS})
+    assert [(pair["a"], pair["b"]) for pair in report["pairs"]] == [("r1", "r2"), ("r1", "r3"), ("r2", "r3")]
+    for pair in report["pairs"]:
+        assert pair["accepted"] is True
+        assert pair["reason"]["code"] == "accepted"
+        assert is_right(pair["a_from_b"], reference_from(pair["b"], pair["a"]))
+        scores = [rival["score_m"] for rival in pair["rivals"]]
+        assert scores == sorted(scores, reverse=True)
+        assert all(score < pair["scores"]["score_m"] for score in scores)
+
+
+def test_a_pair_without_a_candidate() -> None:
+    (report,) = reported({"r1": flat_map("r1"), "r2": bare_room()})
+    (pair,) = report["pairs"]
+    assert pair["accepted"] is False
+    assert report["robots"]["r2"]["reason"]["code"] == pair["reason"]["code"]
+
+
+def test_skipped_messages_are_counted_by_cause() -> None:
+    report = builder()
+    for cause in (SkipCause.EMPTY, SkipCause.BAD_ORIGIN, SkipCause.EMPTY):
+        report.skip(Skipped("r1", "/r1/map", 5, cause, "detail"))
+    found = report.build(None, MergeState.initial(ROBOTS).result, [INPUT])
+    validate(found)
+    assert list(found["skipped"].items()) == [("bad_origin", 1), ("empty", 2)]
+
+
+class TestNumbers:
+    @staticmethod
+    def placed(pose: Sim2, agreement: Agreement | None = None) -> dict[str, Any]:
+        outcome = RobotOutcome(Status.MERGED, Reason(ReasonCode.ACCEPTED, "x"), pose, agreement)
+        known = MergeState.initial(["r1"]).result
+        result: MergeResult = replace(known, robots={"r1": outcome})
+        report = builder(("r1",)).build(0, result, [INPUT])
+        validate(report)
+        return report["robots"]["r1"]
+
+    def test_are_rounded(self) -> None:
+        found = self.placed(Sim2(1.23456789, -1e-9, 1e-9))["merged_from_map"]
+        assert json.dumps(found) == '{"x_m": 1.234568, "y_m": 0.0, "yaw_rad": 0.0, "scale": 1.0}'
+
+    @pytest.mark.parametrize("yaw_rad", [math.pi, -math.pi, -math.pi + 1e-9, 3 * math.pi, math.pi - 1e-9])
+    def test_yaw_is_above_minus_pi_and_at_most_pi(self, yaw_rad: float) -> None:
+        found = self.placed(Sim2(yaw_rad=yaw_rad))["merged_from_map"]["yaw_rad"]
+        assert -math.pi < found <= math.pi
+
+    def test_acceptance_is_absent_without_overlap(self) -> None:
+        found = self.placed(Sim2(), Agreement(0.0, 0.0, 0.0))
+        assert (found["acceptance"], found["overlap_m2"], found["overlap_fraction"]) == (None, 0.0, 0.0)
+        assert self.placed(Sim2(), Agreement(0.5, 3.0, 0.25))["acceptance"] == 0.5
+
+
+def test_a_report_is_not_changed_by_what_comes_later() -> None:
+    first, second = reported({"r1": flat_map("r1")}, {"r2": flat_map("r2")})
+    assert first["history"] == []
+    assert len(second["history"]) == 1
+
+
+def test_causes_are_the_closed_list() -> None:
+    assert SkipCause(BadMessage("empty", "x").cause) is SkipCause.EMPTY

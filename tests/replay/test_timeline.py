@@ -1,0 +1,220 @@
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+import pytest
+
+from mapmerge.grid import Grid
+from replay.errors import InputError
+from replay.events import Clock, Skipped
+from replay.timeline import Feed, Tally, Tick, Window, ticks
+from tests.bags import SECOND, START, Recorded, as_cdr
+from tests.fakes import FakeSource
+from tests.floors import filled
+from tests.runs import at, bad_messages, seen, updated
+
+EVERYTHING = Window(None, None, 5 * SECOND)
+
+
+def numbered(value: int) -> Grid:
+    """Return a small map that is told from others by its cells."""
+    return filled(value, 2, 3)
+
+
+def mapped(robot: str, log_s: float, value: int, stamp_s: float | None = None) -> Recorded:
+    return seen(robot, log_s, numbered(value), stamp_ns=None if stamp_s is None else at(stamp_s))
+
+
+def feed(*messages: Recorded, clock: Clock = "header", offset_ns: int = 0) -> Feed:
+    names = sorted({each.topic for each in messages})
+    robot_of = {name: name.split("/")[1] for name in names}
+    robots = set(robot_of.values())
+    return Feed(FakeSource(messages), robot_of, dict.fromkeys(robots, clock), dict.fromkeys(robots, offset_ns), at(0.0))
+
+
+def run(
+    *feeds: Feed, window: Window = EVERYTHING, strict: bool = False
+) -> tuple[list[Tick | Skipped], tuple[Tally, ...]]:
+    tallies = tuple(Tally() for _ in feeds)
+    return list(ticks(feeds, tallies, window, strict=strict)), tallies
+
+
+def told(items: Sequence[Tick | Skipped]) -> list[tuple[float, dict[str, int]] | str]:
+    """Return what happened, with maps by their cells and times in seconds."""
+    return [
+        str(item.cause)
+        if isinstance(item, Skipped)
+        else (
+            (item.stamp_ns - START) / SECOND,
+            {robot: int(grid.cells[0, 0]) for robot, grid in item.grids.items()},
+        )
+        for item in items
+    ]
+
+
+def test_all_maps_of_one_time_are_one_tick() -> None:
+    a = feed(mapped("r1", 0.0, 1), mapped("r2", 0.0, 2), mapped("r1", 1.0, 3))
+    b = feed(mapped("r3", 0.0, 4), mapped("r3", 2.0, 5))
+    found, _ = run(a, b)
+    assert told(found) == [(0.0, {"r1": 1, "r2": 2, "r3": 4}), (1.0, {"r1": 3}), (2.0, {"r3": 5})]
+    assert [item.messages for item in found if isinstance(item, Tick)] == [3, 1, 1]
+
+
+def test_the_last_of_one_time_counts() -> None:
+    found, _ = run(feed(mapped("r1", 0.0, 1), mapped("r1", 0.0, 2)))
+    assert told(found) == [(0.0, {"r1": 2})]
+
+
+def test_clocks() -> None:
+    messages = [mapped("r1", 10.0, 1, stamp_s=3.0), mapped("r1", 11.0, 2, stamp_s=9.0)]
+    assert [item[0] for item in told(run(feed(*messages))[0])] == [3.0, 9.0]
+    assert [item[0] for item in told(run(feed(*messages, clock="log"))[0])] == [10.0, 11.0]
+    assert [item[0] for item in told(run(feed(*messages, clock="none"))[0])] == [0.0]
+    assert [item[0] for item in told(run(feed(*messages, offset_ns=-SECOND))[0])] == [2.0, 8.0]
+
+
+class TestOrder:
+    def test_within_the_window(self) -> None:
+        order = [5.0, 3.0, 6.0, 1.0, 8.0, 4.0]
+        found, (tally,) = run(feed(*(mapped("r1", index, index, stamp) for index, stamp in enumerate(order))))
+        assert [item[0] for item in told(found)] == sorted(order)
+        assert (tally.late, tally.messages) == (0, 6)
+
+    def test_later_ones_apply_on_arrival(self) -> None:
+        messages = [mapped("r1", 0.0, 1), mapped("r1", 20.0, 2), mapped("r1", 21.0, 3, stamp_s=-1.0)]
+        found, (tally,) = run(feed(*messages))
+        assert told(found) == [(0.0, {"r1": 3}), (20.0, {"r1": 2})]
+        assert tally.late == 1
+
+    def test_exactly_the_window(self) -> None:
+        messages = [mapped("r1", 0.0, 1), mapped("r1", 5.0, 2), mapped("r1", 5.5, 3, stamp_s=0.0)]
+        assert run(feed(*messages))[1][0].late == 0
+
+    def test_equal_times_stay_as_written(self) -> None:
+        found, _ = run(feed(*(mapped("r1", index, index, stamp_s=1.0) for index in range(9))))
+        assert told(found) == [(1.0, {"r1": 8})]
+
+    def test_a_stamp_far_ahead_does_not_hold_the_others(self) -> None:
+        messages = [mapped("r1", 0.0, 1, stamp_s=1e6), mapped("r1", 1.0, 2), mapped("r1", 2.0, 3)]
+        found, _ = run(feed(*messages))
+        stamps = [item.stamp_ns for item in found if isinstance(item, Tick)]
+        assert stamps == sorted(stamps)
+        assert told(found)[-1][1] == {"r1": 1}
+
+    def test_one_recording_s_order_is_no_other_s(self) -> None:
+        a = feed(*(mapped("r1", 10.0 * index, index) for index in range(5)))
+        b = feed(*(mapped("r2", 10.0 * index, index, stamp_s=10.0 * index - 7.0) for index in range(5)))
+        found, tallies = run(a, b)
+        assert [item[0] for item in told(found)] == sorted([0, 10, 20, 30, 40, -7, 3, 13, 23, 33])
+        assert [tally.late for tally in tallies] == [0, 0]
+
+    def test_a_header_without_a_time_applies_on_arrival(self) -> None:
+        one, two, three = (mapped("r1", 10.0 * index, index) for index in range(3))
+        odd = Recorded(two.topic, two.msgtype, two.log_time_ns, {**two.fields, "stamp_ns": 0})
+        found, (tally,) = run(feed(one, odd, three))
+        assert told(found) == [(0.0, {"r1": 1}), (20.0, {"r1": 2})]
+        assert tally.late == 1
+
+    def test_no_time_is_before_1970(self) -> None:
+        found, _ = run(feed(mapped("r1", 1.0, 1), offset_ns=-at(3.0)))
+        assert [item.stamp_ns for item in found if isinstance(item, Tick)] == [0]
+
+
+class TestWindow:
+    def test_start_is_in_and_stop_is_out(self) -> None:
+        messages = [mapped("r1", index, index) for index in range(6)]
+        found, (tally,) = run(feed(*messages), window=Window(at(2.0), at(4.0), 5 * SECOND))
+        assert [item[0] for item in told(found)] == [2.0, 3.0]
+        assert tally.messages == 2
+
+    def test_saved_maps_are_always_in(self) -> None:
+        found, _ = run(feed(mapped("r1", 0.0, 1), clock="none"), window=Window(at(100.0), at(200.0), 0))
+        assert len(found) == 1
+
+    def test_bad_messages_by_their_log_time(self) -> None:
+        bad = list(bad_messages("r1", 10.0).values())
+        recorded = feed(mapped("r1", 0.0, 1, stamp_s=-3.0), *bad, mapped("r1", 30.0, 2, stamp_s=27.0))
+        assert len(run(recorded)[0]) == 2 + len(bad)
+        assert told(run(recorded, window=Window(None, at(5.0), 0))[0]) == [(-3.0, {"r1": 1})]
+        assert len(run(recorded, window=Window(None, at(7.5), 0))[0]) == 2
+
+
+class TestParts:
+    def test_are_applied_in_order_of_time(self) -> None:
+        part = filled(100, 1, 1).cells
+        messages = [mapped("r1", 0.0, 1), updated("r1", 1.0, 1, 0, part), updated("r1", 1.0, 2, 0, part)]
+        found, _ = run(feed(*messages))
+        assert isinstance(found[-1], Tick)
+        assert found[-1].grids["r1"].cells.tolist() == [[1, 100, 100], [1, 1, 1]]
+        assert isinstance(found[0], Tick)
+        assert found[0].grids["r1"].cells.tolist() == [[1, 1, 1], [1, 1, 1]]
+
+    def test_that_do_not_fit(self) -> None:
+        part = filled(100, 1, 1).cells
+        messages = [updated("r1", 0.0, 0, 0, part), mapped("r1", 1.0, 1), updated("r1", 2.0, 3, 0, part)]
+        found, (tally,) = run(feed(*messages))
+        assert told(found) == ["update_before_grid", (1.0, {"r1": 1}), "update_outside_grid"]
+        assert tally.messages == 3
+
+
+class TestBadMessages:
+    def test_are_told_and_counted(self) -> None:
+        bad = bad_messages("r1", 1.0)
+        found, (tally,) = run(feed(mapped("r1", 0.0, 1), *bad.values(), mapped("r1", 9.0, 2)))
+        causes = [item for item in told(found) if isinstance(item, str)]
+        assert causes == list(bad)
+        assert [item for item in told(found) if not isinstance(item, str)] == [(0.0, {"r1": 1}), (9.0, {"r1": 2})]
+        assert tally.messages == 2 + len(bad)
+
+    def test_say_where_they_were(self) -> None:
+        skipped = run(feed(mapped("r1", 0.0, 1), bad_messages("r1", 1.0)["size_mismatch"]))[0][0]
+        assert isinstance(skipped, Skipped)
+        assert (skipped.robot, skipped.topic, skipped.log_time_ns) == ("r1", "/r1/map", at(1.0))
+
+    def test_are_fatal_if_strict(self) -> None:
+        for message in bad_messages("r1", 1.0).values():
+            with pytest.raises(InputError, match="/r1/map of r1 at 17000000"):
+                run(feed(mapped("r1", 0.0, 1), message), strict=True)
+
+    def test_are_no_tick(self) -> None:
+        found, _ = run(feed(*bad_messages("r1", 1.0).values()))
+        assert all(isinstance(item, Skipped) for item in found)
+
+
+def test_every_message_is_counted_once() -> None:
+    messages = [mapped("r1", 0.0, 1), *bad_messages("r1", 1.0).values(), mapped("r1", 9.0, 2), mapped("r1", 9.0, 3)]
+    found, (tally,) = run(feed(*messages))
+    assert sum(item.messages for item in found if isinstance(item, Tick)) == tally.messages == len(messages)
+
+
+def test_the_digest_is_over_topic_time_and_bytes() -> None:
+    messages = [mapped("r1", 0.0, 1), mapped("r2", 1.0, 2)]
+    _, (tally,) = run(feed(*messages))
+    expected = hashlib.sha256()
+    for each in messages:
+        data = as_cdr(each)
+        expected.update(f"{each.topic} {each.log_time_ns} {len(data)}\n".encode() + data)
+    assert tally.digest.hexdigest() == expected.hexdigest()
+
+
+def test_memory_is_that_of_the_window() -> None:
+    """Messages are decoded as they are needed, not all at once."""
+    read: list[int] = []
+
+    class Watched(FakeSource):
+        def messages(self, topics):
+            for raw in super().messages(topics):
+                read.append(raw.log_time_ns)
+                yield raw
+
+    recorded = feed(*(mapped("r1", index, index) for index in range(100)))
+    watched = Feed(
+        Watched([mapped("r1", index, index) for index in range(100)]),
+        recorded.robot_of,
+        recorded.clocks,
+        recorded.offsets_ns,
+        recorded.untimed_ns,
+    )
+    next(iter(ticks([watched], [Tally()], EVERYTHING, strict=False)))
+    assert len(read) <= 8

@@ -1,0 +1,84 @@
+"""What happens in runs of every kind, as events for sinks to take."""
+
+from __future__ import annotations
+
+import functools
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mapmerge.grid import Grid
+from replay.events import Event, Merged
+from replay.options import RunOptions
+from replay.pipeline import merge
+from replay.selection import RunPath
+from tests.bags import Recorded, write_mcap
+from tests.runs import bad_messages, bare_room, begun_anew, flat_map, growing, in_log_order, seen, two_robots
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A recording, how it is read, and what must come of it for the scenario to be what its name says."""
+
+    record: Callable[[], Sequence[Recorded]]
+    is_so: Callable[[Merged | None], bool]
+    images: str = "none"
+
+
+def _nothing() -> Grid:
+    return Grid(np.full((20, 30), -1, np.int8), 0.1)
+
+
+def _statuses(event: Merged | None) -> list[str]:
+    return [str(robot.status) for robot in event.result.robots.values()] if event else []
+
+
+SCENARIOS: dict[str, Scenario] = {
+    "merged": Scenario(
+        two_robots, lambda last: _statuses(last) == ["reference", "merged"] and last.pictures != (), images="changed"
+    ),
+    "three_robots_one_unplaced": Scenario(
+        lambda: in_log_order(two_robots(), [seen("r3", 30.0, bare_room())]),
+        lambda last: _statuses(last) == ["reference", "merged", "unmerged"],
+        images="all",
+    ),
+    "nobody_merged": Scenario(
+        lambda: [seen(robot, index, bare_room()) for index, robot in enumerate(("r1", "r2", "r3"))],
+        lambda last: _statuses(last) == ["reference", "unmerged", "unmerged"],
+        images="changed",
+    ),
+    "restarted": Scenario(
+        lambda: [seen("r1", 0.0), seen("r2", 1.0), seen("r2", 2.0, begun_anew(flat_map("r2", 2.0)))],
+        lambda last: [str(change.kind) for change in last.result.changes] == ["withdrawn"],
+    ),
+    "no_reference": Scenario(
+        lambda: in_log_order([seen("r1", 0.0, resolution=0.0)], growing("r2")),
+        lambda last: _statuses(last) == ["no_map", "unmerged"] and last.result.merged is None,
+    ),
+    "nothing_known": Scenario(
+        lambda: [seen("r1", 0.0, _nothing()), seen("r2", 1.0)],
+        lambda last: last.result.merged is not None and last.result.merged.cells.size == 0,
+        images="all",
+    ),
+    "no_map_at_all": Scenario(
+        lambda: in_log_order(*(list(bad_messages(robot, 0.0).values()) for robot in ("r1", "r2"))),
+        lambda last: last is None,
+    ),
+    "one_robot": Scenario(lambda: growing("r1"), lambda last: _statuses(last) == ["reference"], images="changed"),
+}
+
+
+@functools.cache
+def events_of(name: str) -> tuple[Event, ...]:
+    """Return all that happens in a scenario."""
+    scenario = SCENARIOS[name]
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_mcap(Path(folder) / "run.mcap", scenario.record())
+        options = RunOptions((RunPath(None, path),), images=scenario.images)  # type: ignore[arg-type]
+        events = tuple(merge(options))
+    last = next((event for event in reversed(events) if isinstance(event, Merged)), None)
+    assert scenario.is_so(last), (name, last)
+    return events
