@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, fields
 
 from mapmerge.errors import ConfigError
 
+_DIVISORS = {"wall_spacing_m", "angle_step_rad", "cell_m", "reject_m", "blur_cells"}
+
 
 @dataclass(frozen=True, slots=True)
 class _Settings:
@@ -15,8 +17,11 @@ class _Settings:
     def __post_init__(self) -> None:
         for item in fields(self):
             value = getattr(self, item.name)
-            if isinstance(value, (int, float)) and not (math.isfinite(value) and value >= 0):
-                raise ConfigError(f"{item.name} is {value}; expected a finite number that is not negative")
+            for number in value if isinstance(value, tuple) else (value,):
+                if isinstance(number, (int, float)) and not (math.isfinite(number) and number >= 0):
+                    raise ConfigError(f"{item.name} is {value}; expected finite numbers that are not negative")
+            if item.name in _DIVISORS and not (min(value, default=1.0) if isinstance(value, tuple) else value) > 0:
+                raise ConfigError(f"{item.name} is {value}; expected more than 0")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,11 +99,17 @@ class RefineConfig(_Settings):
         At most so many steps at each of these distances.
     max_points
         Wall points used, evenly thinned.
+    max_polish_points
+        Wall cells used in the last, finest alignment.
+    blur_cells
+        Standard deviation, in cells, by which walls are blurred there.
     """
 
     reject_m: tuple[float, ...] = (0.8, 0.4, 0.2)
     iterations: int = 12
     max_points: int = 1500
+    max_polish_points: int = 3000
+    blur_cells: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -236,28 +235,17 @@ def _tile(warp: _Warp, box: tuple[int, int, int, int]) -> Bytes | None:
         return None
     if warp.cells.size == 0:
         return None
-    linear = warp.cell_from_canvas[:, :2]
-    corners = np.array([[left, top], [right, top], [left, bottom], [right, bottom]], dtype=np.float64)
-    reach = corners @ linear.T + warp.cell_from_canvas[:, 2]
-    low = np.clip(np.floor(reach.min(axis=0)).astype(int) - 1, 0, (warp.cells.shape[1], warp.cells.shape[0]))
-    high = np.clip(np.ceil(reach.max(axis=0)).astype(int) + 1, 0, (warp.cells.shape[1], warp.cells.shape[0]))
-    part = warp.cells[low[1] : high[1], low[0] : high[0]]
-    if part.size == 0:
+    (a, b, x), (c, d, y) = warp.cell_from_canvas
+    across, up = np.arange(left, right) + 0.5, np.arange(top, bottom)[:, None] + 0.5
+    # from the canvas' own numbers, so that the outcome does not depend on where tiles begin
+    col, row = np.floor(a * across + x + b * up).astype(np.int32), np.floor(c * across + y + d * up).astype(np.int32)
+    rows, cols = warp.cells.shape
+    inside = (col >= 0) & (col < cols) & (row >= 0) & (row < rows)
+    if not inside.any():
         return None
-    # OpenCV counts from the centres of cells, this module from their corners
-    first_centre = linear @ (left + 0.5, top + 0.5) + warp.cell_from_canvas[:, 2] - low - 0.5
-    matrix = np.hstack([linear, first_centre[:, None]])
-    return np.asarray(
-        cv2.warpAffine(
-            part,
-            matrix,
-            (right - left, bottom - top),
-            flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP,
-            borderMode=cv2.BORDER_CONSTANT,
-            borderValue=_UNKNOWN_BYTE,
-        ),
-        np.uint8,
-    )
+    tile = np.full(inside.shape, _UNKNOWN_BYTE, np.uint8)
+    tile[inside] = warp.cells[row[inside], col[inside]]
+    return tile
 
 
 def _agreement(count: _Counts, cell_m2: float) -> Agreement:

@@ -111,6 +111,8 @@ class MergeState:
     ----------
     result
         The last result.
+    matches
+        What the matcher said of each pair, before placements that contradict each other are refused.
     prepared
         What the matcher computed for one map at one resolution, for the latest maps only.
     reported
@@ -118,6 +120,7 @@ class MergeState:
     """
 
     result: MergeResult
+    matches: Mapping[Pair, Match] = field(default_factory=dict)
     prepared: Mapping[tuple[str, float], Any] = field(default_factory=dict)
     reported: Mapping[str, Sim2] = field(default_factory=dict)
 
@@ -152,15 +155,15 @@ def step(state: MergeState, updates: Mapping[str, Grid], config: MergeConfig) ->
         for robot in robots
         if robot in updated or robot in state.result.grids
     }
-    pairs, prepared = _matched(state, grids, updated, config)
-    forest = _placed(grids, pairs, config)
-    pairs = _without_contradicted(pairs, forest)
+    matches, prepared = _matched(state, grids, updated, config)
+    forest = _placed(grids, matches, config)
+    pairs = _without_contradicted(matches, forest)
     layers = _layers(robots[0], grids, forest)
     fusion = fuse(list(layers.values()), grids[robots[0]], config.cells) if layers else None
     outcomes = _outcomes(robots, pairs, forest, layers, fusion)
     changes, reported = _changes(robots[0], outcomes, state.reported, grids, config)
     result = MergeResult(outcomes, grids, pairs, fusion.grid if fusion else None, updated, changes)
-    return MergeState(result, prepared, reported), result
+    return MergeState(result, matches, prepared, reported), result
 
 
 def _is_new(update: Grid | None, known: Grid | None) -> bool:
@@ -175,8 +178,8 @@ def _matched(
     prepared = {key: value for key, value in state.prepared.items() if key[0] not in updated}
     pairs: dict[Pair, Match] = {}
     for pair in combinations(grids, 2):
-        if pair in state.result.pairs and not set(pair) & set(updated):
-            pairs[pair] = state.result.pairs[pair]
+        if pair in state.matches and not set(pair) & set(updated):
+            pairs[pair] = state.matches[pair]
             continue
         resolution_m = max(config.search.working_cell_m, *(grids[robot].resolution_m for robot in pair))
         for robot in pair:

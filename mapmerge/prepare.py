@@ -34,8 +34,9 @@ class PreparedMap:
         Shape (rows, columns), uint8: `CELL_UNKNOWN`, `CELL_FREE` or `CELL_OCCUPIED`; padded by `margin` cells.
     wall_distance_m
         Shape as `classes`: distance of each cell to the nearest occupied one.
-    nearest_wall
-        Shape as `classes`: row of `wall_cells_m` that is nearest.
+    nearest_wall, nearest_wall_too
+        Shape as `classes`: row of `wall_cells_m` that is nearest. Where several are, these are one from each end of
+        the map, so that their mean prefers no direction.
     wall_cells_m
         Centres of all occupied cells, shape (N, 2).
     walls_m
@@ -50,6 +51,7 @@ class PreparedMap:
     classes: NDArray[np.uint8]
     wall_distance_m: NDArray[np.float32]
     nearest_wall: NDArray[np.int32]
+    nearest_wall_too: NDArray[np.int32]
     wall_cells_m: Points
     walls_m: Points
     free_m: Points
@@ -85,12 +87,14 @@ def prepare(grid: Grid, resolution_m: float, config: MergeConfig) -> PreparedMap
     free = np.pad((cropped.cells >= 0) & (cropped.cells <= config.cells.max_free_percent), margin)
     classes = np.where(occupied, CELL_OCCUPIED, np.where(free, CELL_FREE, CELL_UNKNOWN)).astype(np.uint8)
     distance_m, nearest = _distance_to_walls(occupied, resolution_m)
+    _, turned = _distance_to_walls(occupied[::-1, ::-1], resolution_m)
     wall_cells_m = _centres(occupied, margin, resolution_m)
     return PreparedMap(
         grid=cropped,
         classes=classes,
         wall_distance_m=distance_m,
         nearest_wall=nearest,
+        nearest_wall_too=np.ascontiguousarray(max(len(wall_cells_m) - 1, 0) - turned[::-1, ::-1]),
         wall_cells_m=wall_cells_m,
         walls_m=thinned(wall_cells_m, config.search.wall_spacing_m),
         free_m=_sampled(free, margin, resolution_m),

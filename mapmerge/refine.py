@@ -2,6 +2,9 @@
 
 The nearest wall of a point is a look-up in the target's labelled distance transform, so a step costs one pass over
 the points. Pairs beyond a distance that narrows are left out: plain ICP pulls good alignments away.
+
+ICP on cell centres cannot tell where in a cell it ends. `polish` can: it maximises the correlation of both maps' walls,
+each blurred by about a cell, which is smooth and treats the two maps alike.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmerge.config import RefineConfig
-from mapmerge.prepare import PreparedMap
+from mapmerge.prepare import CELL_OCCUPIED, PreparedMap
 from mapmerge.sim2 import Points, Sim2
 
 _CONVERGED_M = 1e-4
@@ -39,8 +42,32 @@ def refine(target: PreparedMap, walls_m: Points, start: Sim2, config: RefineConf
             if step is None:
                 return pose
             pose = step @ pose
-            if math.hypot(step.x_m, step.y_m) < _CONVERGED_M and abs(step.yaw_rad) < _CONVERGED_RAD:
+            if _is_still(step):
                 break
+    return pose
+
+
+def polish(target: PreparedMap, wall_cells_m: Points, start: Sim2, config: RefineConfig) -> Sim2:
+    """Return ``target_from_source`` aligned to a fraction of a cell, searched from a placement that is right to a cell.
+
+    Parameters
+    ----------
+    target
+        The map that stays.
+    wall_cells_m
+        Centres of the source's occupied cells in its grid frame, shape (N, 2).
+    start
+        ``target_from_source`` that `refine` returned.
+    """
+    cells_m = evenly(wall_cells_m, config.max_polish_points)
+    pose = start
+    for _ in range(config.iterations):
+        step = _blurred_step(target, pose.apply(cells_m), config.blur_cells)
+        if step is None:
+            return pose
+        pose = step @ pose
+        if _is_still(step):
+            break
     return pose
 
 
@@ -63,12 +90,48 @@ def _icp_step(target: PreparedMap, points_m: Points, reject_m: float) -> Sim2 | 
     if int(np.count_nonzero(near)) < _MIN_PAIRS:
         return None
     points, index = points_m[near], index[near]
-    error = target.wall_cells_m[target.nearest_wall.ravel()[index]] - points
+    walls = target.wall_cells_m
+    nearest = 0.5 * (walls[target.nearest_wall.ravel()[index]] + walls[target.nearest_wall_too.ravel()[index]])
+    error = nearest - points
     distance = np.hypot(error[:, 0], error[:, 1])
     # Cauchy weights: what is far apart says less
     weight = 1.0 / (1.0 + np.square(distance / (0.35 * reject_m)))
     centre = points.mean(axis=0)
     return _rigid_motion(points - centre, error, weight, centre)
+
+
+def _blurred_step(target: PreparedMap, points_m: Points, blur_cells: float) -> Sim2 | None:
+    """One step: draw each point to the mean of the walls around it, near ones counting more.
+
+    Each point counts as much as there are walls around it, so that the pulls of two equal maps cancel out exactly.
+    """
+    reach = math.ceil(3.0 * blur_cells)
+    around = np.arange(-reach, reach + 1)
+    rows, cols = target.classes.shape
+    place = points_m / target.resolution_m + target.margin
+    cell = np.floor(place).astype(np.intp)
+    row, col = cell[:, 1, None] + around, cell[:, 0, None] + around
+    kernel_y = np.exp(-0.5 * np.square((row + 0.5 - place[:, 1, None]) / blur_cells))
+    kernel_x = np.exp(-0.5 * np.square((col + 0.5 - place[:, 0, None]) / blur_cells))
+    inside = ((row >= 0) & (row < rows))[:, :, None] & ((col >= 0) & (col < cols))[:, None, :]
+    index = np.clip(row, 0, rows - 1)[:, :, None] * cols + np.clip(col, 0, cols - 1)[:, None, :]
+    walls = (target.classes.ravel()[index] == CELL_OCCUPIED) & inside
+    pull = walls * kernel_y[:, :, None] * kernel_x[:, None, :]
+    weight = pull.sum(axis=(1, 2))
+    drawn = weight > 0
+    if int(np.count_nonzero(drawn)) < _MIN_PAIRS:
+        return None
+    pull, weight, place = pull[drawn], weight[drawn], place[drawn]
+    error: Points = np.empty_like(place)
+    error[:, 0] = (pull * (col[drawn] + 0.5)[:, None, :]).sum(axis=(1, 2)) / weight - place[:, 0]
+    error[:, 1] = (pull * (row[drawn] + 0.5)[:, :, None]).sum(axis=(1, 2)) / weight - place[:, 1]
+    points = points_m[drawn]
+    centre = points.mean(axis=0)
+    return _rigid_motion(points - centre, error * target.resolution_m, weight, centre)
+
+
+def _is_still(step: Sim2) -> bool:
+    return math.hypot(step.x_m, step.y_m) < _CONVERGED_M and abs(step.yaw_rad) < _CONVERGED_RAD
 
 
 def _rigid_motion(arms: Points, error: Points, weight: NDArray[np.float64], centre: Points) -> Sim2:

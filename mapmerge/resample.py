@@ -20,8 +20,10 @@ def at_resolution(grid: Grid, resolution_m: float, config: CellConfig) -> Grid:
     else it is the mean of what is known. Finer: cells are repeated.
     """
     ratio = resolution_m / grid.resolution_m
-    if abs(ratio - 1.0) < _SAME or grid.cells.size == 0:
+    if abs(ratio - 1.0) < _SAME:
         return grid
+    if grid.cells.size == 0:
+        return Grid(grid.cells, resolution_m, grid.map_from_grid)
     cells = _pooled(grid.cells, ratio, config) if ratio > 1.0 else _repeated(grid.cells, ratio)
     return Grid(cells, resolution_m, grid.map_from_grid)
 
@@ -29,8 +31,8 @@ def at_resolution(grid: Grid, resolution_m: float, config: CellConfig) -> Grid:
 def _starts(count: int, ratio: float) -> NDArray[np.intp]:
     """First fine index of each coarse cell along one axis."""
     coarse = math.ceil(count / ratio - _SAME)
-    starts = np.ceil(np.arange(coarse) * ratio - _SAME).astype(np.intp)
-    return np.asarray(np.minimum(starts, count - 1), np.intp)
+    starts = np.ceil(np.arange(coarse) * ratio - 0.5 - _SAME).astype(np.intp)
+    return np.asarray(starts[starts < count], np.intp)
 
 
 def _pooled(cells: Cells, ratio: float, config: CellConfig) -> Cells:

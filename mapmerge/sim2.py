@@ -42,6 +42,8 @@ class Sim2:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
+        if not 0.0 < self.scale < math.inf:
+            raise ValueError(f"scale is {self.scale}; expected a positive number")
         object.__setattr__(self, "yaw_rad", wrap_angle(self.yaw_rad))
 
     def __matmul__(self, other: Sim2) -> Sim2:

@@ -3,14 +3,14 @@
 1. Rotations from the orientation spectra, each also turned by 180°.
 2. Translations for each rotation from the correlation of coarse maps: walls on walls, less walls in free space.
 3. Every candidate aligned by ICP against the target's distance transform.
-4. Candidates ranked by walls and free space that agree, in both directions.
+4. Candidates ranked by walls and free space that agree, in both directions; the best one aligned more finely.
 5. The best one verified, and compared with the best one that is distinct from it.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 
 from mapmerge.config import MergeConfig, VerifyConfig
@@ -21,11 +21,13 @@ from mapmerge.match.spectrum import Spectrum, orientation_spectrum, rotation_pea
 from mapmerge.match.surface import CorrelationSurface, Peak, TranslationSearch, surface_peaks
 from mapmerge.prepare import PreparedMap, prepare
 from mapmerge.reasons import Reason, ReasonCode
-from mapmerge.refine import evenly, refine
+from mapmerge.refine import evenly, polish, refine
 from mapmerge.sim2 import Sim2
 from mapmerge.verify import Scores, rank_score_m, verify
 
 _RIVALS_REPORTED = 3
+_BESIDE = 1.2
+_BESIDE_POINTS = 500
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,8 +68,12 @@ class CorrelationMatcher:
         if not candidates:
             reason = Reason(ReasonCode.NO_CANDIDATE, "no placement lets walls of the two maps coincide")
             return Match(None, None, accepted=False, reason=reason, evidence=(_spectra(target, source, rotations),))
-        best = candidates[0]
+        best = _polished(candidates[0], target.map, source.map, config)
         scores = verify(target.map, source.map, best.target_from_source, config.search.wall_spacing_m, config.verify)
+        others = candidates[1:]
+        if judge(scores, None, config.verify).code is ReasonCode.ACCEPTED:
+            others = [*others, *_beside(best, target.map, source.map, config)]
+        candidates = [best, *sorted(others, key=lambda candidate: -candidate.score_m)]
         rivals = tuple(islice(_distinct(candidates, source.map, config.verify), _RIVALS_REPORTED))
         reason = judge(scores, rivals[0].score_m if rivals else None, config.verify)
         return Match(
@@ -90,19 +96,25 @@ class CorrelationMatcher:
 def judge(scores: Scores, rival_score_m: float | None, config: VerifyConfig) -> Reason:
     """Return why a placement is accepted or, the first test that it fails, why not."""
     if scores.overlap_m2 < config.min_overlap_m2:
-        message = f"the maps share {scores.overlap_m2:.1f} m², less than {config.min_overlap_m2:g} m²"
+        message = f"the maps share {_down(scores.overlap_m2, 1):.1f} m², less than {config.min_overlap_m2:g} m²"
         return Reason(ReasonCode.TOO_LITTLE_OVERLAP, message)
     if scores.matched_wall_m < config.min_matched_wall_m:
-        message = f"the maps share {scores.matched_wall_m:.1f} m of wall, less than {config.min_matched_wall_m:g} m"
+        message = (
+            f"the maps share {_down(scores.matched_wall_m, 1):.1f} m of wall, less than {config.min_matched_wall_m:g} m"
+        )
         return Reason(ReasonCode.TOO_LITTLE_OVERLAP, message)
     if scores.wall_agreement < config.min_wall_agreement:
         message = (
-            f"of the walls in the overlap {scores.wall_agreement:.0%} agree, less than {config.min_wall_agreement:.0%}"
+            f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree, "
+            f"less than {config.min_wall_agreement:.0%}"
         )
         return Reason(ReasonCode.WALLS_DISAGREE, message)
     if scores.acceptance < config.min_acceptance:
-        message = f"the acceptance index is {scores.acceptance:.3f}, less than {config.min_acceptance:g}"
+        message = f"the acceptance index is {_down(scores.acceptance, 3):.3f}, less than {config.min_acceptance:g}"
         return Reason(ReasonCode.LOW_ACCEPTANCE, message)
+    if scores.score_m <= 0.0:
+        message = f"walls in the other map's free space outweigh what agrees, the score is {scores.score_m:.1f} m"
+        return Reason(ReasonCode.WALLS_DISAGREE, message)
     likeness = max(0.0, rival_score_m / scores.score_m) if rival_score_m is not None else 0.0
     if likeness > 1.0 - config.min_margin:
         message = (
@@ -114,6 +126,11 @@ def judge(scores: Scores, rival_score_m: float | None, config: VerifyConfig) -> 
         f"next best placement {likeness:.2f} times as good"
     )
     return Reason(ReasonCode.ACCEPTED, message)
+
+
+def _down(value: float, digits: int) -> float:
+    """Round down, so that what is less than a limit reads like that."""
+    return math.floor(value * 10.0**digits) / 10.0**digits
 
 
 def _too_little_structure(target: PreparedMap, source: PreparedMap, config: MergeConfig) -> Reason | None:
@@ -144,21 +161,44 @@ def _candidates(
     return candidates
 
 
+def _polished(best: _Candidate, target: PreparedMap, source: PreparedMap, config: MergeConfig) -> _Candidate:
+    """Return the best candidate, aligned to a fraction of a cell."""
+    pose = polish(target, source.wall_cells_m, best.target_from_source, config.refine)
+    score_m = rank_score_m(target, source, pose, config.search.wall_spacing_m, config.verify)
+    return replace(best, target_from_source=pose, score_m=score_m)
+
+
+def _beside(best: _Candidate, target: PreparedMap, source: PreparedMap, config: MergeConfig) -> list[_Candidate]:
+    """Return candidates that begin beside the best one and do not come back to it.
+
+    Along walls without an end the score has a ridge but no second peak, so that no peak of a surface is a rival there.
+    """
+    walls_m = evenly(source.walls_m, _BESIDE_POINTS)
+    reach_m = _BESIDE * config.verify.distinct_m
+    found = []
+    for turn in range(8):
+        angle_rad = turn * math.tau / 8
+        shift = Sim2(reach_m * math.cos(angle_rad), reach_m * math.sin(angle_rad))
+        pose = refine(target, walls_m, shift @ best.target_from_source, config.refine)
+        if not _same_place(best.target_from_source, pose, source, config.verify):
+            score_m = rank_score_m(target, source, pose, config.search.wall_spacing_m, config.verify)
+            found.append(_Candidate(pose, score_m, best.surface, best.peak))
+    return found
+
+
+def _same_place(one: Sim2, other: Sim2, source: PreparedMap, config: VerifyConfig) -> bool:
+    x_m, y_m = source.walls_m.mean(axis=0)
+    return one.is_close(
+        other, distance_m=config.distinct_m, angle_rad=config.distinct_rad, at_m=(float(x_m), float(y_m))
+    )
+
+
 def _distinct(candidates: list[_Candidate], source: PreparedMap, config: VerifyConfig) -> list[_Candidate]:
     """Return the candidates, best first, each of which differs from all better ones."""
-    centre = source.walls_m.mean(axis=0)
-    at_m = (float(centre[0]), float(centre[1]))
     kept = candidates[:1]
     for candidate in candidates[1:]:
-        if not any(
-            candidate.target_from_source.is_close(
-                other.target_from_source,
-                distance_m=config.distinct_m,
-                angle_rad=config.distinct_rad,
-                at_m=at_m,
-            )
-            for other in kept
-        ):
+        pose = candidate.target_from_source
+        if not any(_same_place(pose, other.target_from_source, source, config) for other in kept):
             kept.append(candidate)
     return kept[1:]
 

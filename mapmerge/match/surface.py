@@ -68,7 +68,7 @@ class TranslationSearch:
         """
         turn = Sim2(yaw_rad=yaw_rad)
         walls_m, free_m = turn.apply(self._source.walls_m), turn.apply(self._source.free_m)
-        low = np.minimum(walls_m.min(axis=0), free_m.min(axis=0)) if len(free_m) else walls_m.min(axis=0)
+        low = np.vstack([walls_m, free_m]).min(axis=0, initial=self._reach_m)
         walls = self._raster(walls_m - low)
         free = self._raster(free_m - low).astype(bool).astype(np.float32)
         product = self._cost_spectrum * np.conj(np.fft.rfft2(walls))
