@@ -56,20 +56,23 @@ class SearchConfig(_Settings):
     Parameters
     ----------
     wall_spacing_m
-        Walls are thinned to one point per square of this side, so that a metre of wall weighs the same in maps of
-        any resolution.
+        Walls are thinned to one point per square of this side or, in coarser maps, per cell, which then stands for
+        a cell of wall: a metre of wall weighs about the same in maps of any resolution.
     angle_step_rad
         Step of the orientation spectrum.
     rotations
         Rotations taken from the spectra's correlation; each is tried as it is and turned by 180°.
     cell_m
-        Side of the cells of the coarse maps that are correlated.
+        Side of the cells of the coarse maps that are correlated; larger where the maps have larger cells, or would
+        need more than `max_side_cells` of them.
     free_weight
         What a wall in the other map's free space costs, against 1 for a wall on a wall.
     shifts
         Peaks of the correlation surface that are taken for each rotation.
     peak_distance_m
         Least distance of two peaks of one surface.
+    max_side_cells
+        Most cells a side of the correlated maps.
     max_candidates
         Candidates of all rotations that are refined.
     working_cell_m
@@ -83,6 +86,7 @@ class SearchConfig(_Settings):
     free_weight: float = 0.25
     shifts: int = 8
     peak_distance_m: float = 0.8
+    max_side_cells: int = 1500
     max_candidates: int = 48
     working_cell_m: float = 0.05
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmerge.config import CellConfig
-from mapmerge.grid import Cells, Grid
+from mapmerge.grid import MAX_PERCENT, Cells, Grid
 from mapmerge.resample import at_resolution
 from mapmerge.sim2 import Sim2
 
@@ -24,7 +24,6 @@ _TILE_CELLS = 2048
 _UNIT = 1_000_000
 _P_MIN = 0.01
 _UNKNOWN_BYTE = 255
-_MAX_PERCENT = 100
 
 Bytes = NDArray[np.uint8]
 Whole = NDArray[np.int32]
@@ -137,7 +136,7 @@ class _LogOdds:
         positive, negative = self._sums([tile for tile, _ in present])
         layers_known = np.zeros(present[0][0].shape, np.int32)
         for tile, _ in present:
-            layers_known += tile <= _MAX_PERCENT
+            layers_known += tile <= MAX_PERCENT
         for tile, count in present:
             self._count(tile, positive, negative, layers_known, count)
         anything = int(np.count_nonzero(layers_known))
@@ -162,7 +161,7 @@ class _LogOdds:
         return values
 
     def _count(self, tile: Bytes, positive: Whole, negative: Whole, layers_known: Whole, count: _Counts) -> None:
-        known = tile <= _MAX_PERCENT
+        known = tile <= MAX_PERCENT
         others = layers_known - known
         count.known += int(np.count_nonzero(known))
         count.others_known += int(np.count_nonzero(others))
@@ -217,7 +216,7 @@ def _snapped(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return a map that is a whole shift but for rounding errors as exactly that, so that cells are copied as is."""
     whole = np.rint(shift)
-    if np.allclose(linear, np.eye(2), atol=1e-9) and np.allclose(shift, whole, atol=1e-3):
+    if np.allclose(linear, np.eye(2), rtol=0, atol=1e-7) and np.allclose(shift, whole, rtol=0, atol=1e-3):
         return np.eye(2), whole
     return linear, shift
 

@@ -23,7 +23,7 @@ class Edge:
     weight
         The larger, the more it is trusted.
     at_m
-        A point of the source's map frame, amid its walls, at which placements are compared.
+        A point of the source's map frame, amid what it knows, at which placements are compared.
     """
 
     target: str

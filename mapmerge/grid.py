@@ -16,6 +16,7 @@ Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
 UNKNOWN = -1
+MAX_PERCENT = 100
 MAX_SIDE_CELLS = 100_000
 
 
@@ -44,7 +45,7 @@ class Grid:
     Raises
     ------
     GridError
-        If the shape, the resolution or the origin is not that of a map.
+        If the shape, a cell's value, the resolution or the origin is not that of a map.
     """
 
     cells: Cells
@@ -59,6 +60,9 @@ class Grid:
         if max(self.cells.shape) > MAX_SIDE_CELLS:
             rows, cols = self.cells.shape
             raise GridError(f"the grid has {cols} × {rows} cells; a side of at most {MAX_SIDE_CELLS} is expected")
+        if self.cells.size and not (self.cells.min() >= UNKNOWN and self.cells.max() <= MAX_PERCENT):
+            low, high = self.cells.min(), self.cells.max()
+            raise GridError(f"cells are between {low} and {high}; expected {UNKNOWN} (unknown) or 0 to {MAX_PERCENT}")
         pose = self.map_from_grid
         if not all(map(math.isfinite, (pose.x_m, pose.y_m, pose.yaw_rad))):
             raise GridError(f"the origin is ({pose.x_m}, {pose.y_m}, {pose.yaw_rad}); finite numbers are expected")

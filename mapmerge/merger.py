@@ -84,7 +84,7 @@ class MergeResult:
     robots
         Outcome of each robot, in the order given, the reference first.
     grids
-        Latest map of each robot that has one.
+        Latest map of each robot that sent one.
     pairs
         Latest match of each pair of robots with maps, target first.
     merged
@@ -114,7 +114,9 @@ class MergeState:
     matches
         What the matcher said of each pair, before placements that contradict each other are refused.
     prepared
-        What the matcher computed for one map at one resolution, for the latest maps only.
+        What the matcher computed for one map, the latest, at one resolution.
+    centres_m
+        Middle of what each map knows, in its map frame: where placements are compared.
     reported
         Placements as they were last reported in a change.
     """
@@ -122,6 +124,7 @@ class MergeState:
     result: MergeResult
     matches: Mapping[Pair, Match] = field(default_factory=dict)
     prepared: Mapping[tuple[str, float], Any] = field(default_factory=dict)
+    centres_m: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     reported: Mapping[str, Sim2] = field(default_factory=dict)
 
     @staticmethod
@@ -135,7 +138,7 @@ class MergeState:
         """
         if not robots or len(set(robots)) != len(robots):
             raise ConfigError(f"robots are {list(robots)}; expected at least one, each once")
-        waiting = Reason(ReasonCode.NO_MAP, "no map yet")
+        waiting = Reason(ReasonCode.NO_MAP, "no map that shows anything yet")
         outcomes = {robot: RobotOutcome(Status.NO_MAP, waiting) for robot in robots}
         return MergeState(MergeResult(outcomes, {}, {}, None, (), ()))
 
@@ -143,9 +146,18 @@ class MergeState:
 def step(state: MergeState, updates: Mapping[str, Grid], config: MergeConfig) -> tuple[MergeState, MergeResult]:
     """Take in new maps and return what is known then.
 
-    Maps that say what was known already cost nothing: pairs of unchanged maps are not matched again.
+    Maps that say what was known already cost nothing: pairs of unchanged maps are not matched again. A map in which
+    nothing is known is no map.
+
+    Raises
+    ------
+    ConfigError
+        If an update is of a robot that is not among those of the state.
     """
     robots = tuple(state.result.robots)
+    strangers = sorted(set(updates) - set(robots))
+    if strangers:
+        raise ConfigError(f"there are maps of {', '.join(strangers)}; expected only maps of {', '.join(robots)}")
     updated = tuple(robot for robot in robots if _is_new(updates.get(robot), state.result.grids.get(robot)))
     if not updated:
         result = replace(state.result, updated=(), changes=())
@@ -155,15 +167,17 @@ def step(state: MergeState, updates: Mapping[str, Grid], config: MergeConfig) ->
         for robot in robots
         if robot in updated or robot in state.result.grids
     }
-    matches, prepared = _matched(state, grids, updated, config)
-    forest = _placed(grids, matches, config)
+    maps = {robot: grid for robot, grid in grids.items() if grid.known.any()}
+    matches, prepared = _matched(state, maps, updated, config)
+    centres_m = {robot: _centre_m(maps[robot]) if robot in updated else state.centres_m[robot] for robot in maps}
+    forest = _placed(centres_m, matches, config)
     pairs = _without_contradicted(matches, forest)
-    layers = _layers(robots[0], grids, forest)
+    layers = _layers(robots[0], maps, forest)
     fusion = fuse(list(layers.values()), grids[robots[0]], config.cells) if layers else None
     outcomes = _outcomes(robots, pairs, forest, layers, fusion)
-    changes, reported = _changes(robots[0], outcomes, state.reported, grids, config)
+    changes, reported = _changes(robots[0], outcomes, state.reported, centres_m, config)
     result = MergeResult(outcomes, grids, pairs, fusion.grid if fusion else None, updated, changes)
-    return MergeState(result, matches, prepared, reported), result
+    return MergeState(result, matches, prepared, centres_m, reported), result
 
 
 def _is_new(update: Grid | None, known: Grid | None) -> bool:
@@ -190,14 +204,14 @@ def _matched(
     return pairs, prepared
 
 
-def _placed(grids: Mapping[str, Grid], pairs: Mapping[Pair, Match], config: MergeConfig) -> Forest:
+def _placed(centres_m: Mapping[str, tuple[float, float]], pairs: Mapping[Pair, Match], config: MergeConfig) -> Forest:
     edges = [
-        Edge(target, source, match.target_from_source, match.scores.score_m, _centre_m(grids[source]))
+        Edge(target, source, match.target_from_source, match.scores.score_m, centres_m[source])
         for (target, source), match in pairs.items()
         if match.accepted and match.target_from_source is not None and match.scores is not None
     ]
     limits = config.verify
-    return place(list(grids), edges, distance_m=limits.distinct_m, angle_rad=limits.distinct_rad)
+    return place(list(centres_m), edges, distance_m=limits.distinct_m, angle_rad=limits.distinct_rad)
 
 
 def _without_contradicted(pairs: dict[Pair, Match], forest: Forest) -> dict[Pair, Match]:
@@ -234,7 +248,7 @@ def _outcomes(
     for robot in robots:
         placement = forest.placements.get(robot)
         if placement is None:
-            outcomes[robot] = RobotOutcome(Status.NO_MAP, Reason(ReasonCode.NO_MAP, "no map yet"))
+            outcomes[robot] = RobotOutcome(Status.NO_MAP, Reason(ReasonCode.NO_MAP, "no map that shows anything yet"))
         elif robot in layers:
             outcomes[robot] = _placed_outcome(robot, placement, pairs, agreements[robot])
         else:
@@ -293,7 +307,7 @@ def _changes(
     reference: str,
     outcomes: Mapping[str, RobotOutcome],
     reported: Mapping[str, Sim2],
-    grids: Mapping[str, Grid],
+    centres_m: Mapping[str, tuple[float, float]],
     config: MergeConfig,
 ) -> tuple[tuple[Change, ...], dict[str, Sim2]]:
     """Compare the placements with those reported last."""
@@ -310,7 +324,7 @@ def _changes(
         now[robot] = pose
         if before is None:
             changes.append(Change(robot, ChangeKind.PLACED, outcome.reason))
-        elif pose.is_close(before, distance_m=config.moved_m, angle_rad=config.moved_rad, at_m=_centre_m(grids[robot])):
+        elif pose.is_close(before, distance_m=config.moved_m, angle_rad=config.moved_rad, at_m=centres_m[robot]):
             now[robot] = before
         else:
             changes.append(Change(robot, ChangeKind.MOVED, outcome.reason))
@@ -318,4 +332,6 @@ def _changes(
 
 
 def _centre_m(grid: Grid) -> tuple[float, float]:
+    """Return the middle of what a map knows, in its map frame."""
+    grid = grid.cropped_to_known()
     return grid.map_from_grid.apply_point(grid.cols * grid.resolution_m / 2, grid.rows * grid.resolution_m / 2)

@@ -42,7 +42,9 @@ class PreparedMap:
     walls_m
         The same thinned to one point per `SearchConfig.wall_spacing_m`, shape (M, 2).
     free_m
-        Free space, one point per `FREE_SPACING_M`, shape (K, 2).
+        Free space, one point per about `FREE_SPACING_M`, shape (K, 2).
+    wall_spacing_m, free_spacing_m
+        What one of these points stands for: metres of wall, and the side of a square of free space.
     margin
         Cells of padding on each side.
     """
@@ -55,6 +57,8 @@ class PreparedMap:
     wall_cells_m: Points
     walls_m: Points
     free_m: Points
+    wall_spacing_m: float
+    free_spacing_m: float
     margin: int
 
     @property
@@ -82,13 +86,15 @@ class PreparedMap:
 def prepare(grid: Grid, resolution_m: float, config: MergeConfig) -> PreparedMap:
     """Prepare a map for matching at a resolution that is not finer than its own."""
     cropped = at_resolution(grid.cropped_to_known(), resolution_m, config.cells)
-    margin = int(np.ceil(_MARGIN_M / resolution_m))
+    # a point outside of the map is looked up in a corner of the margin, which must be beyond the reach of ICP
+    margin = int(np.ceil(max(_MARGIN_M, *config.refine.reject_m) / resolution_m)) + 1
     occupied = np.pad(cropped.cells >= config.cells.min_occupied_percent, margin)
     free = np.pad((cropped.cells >= 0) & (cropped.cells <= config.cells.max_free_percent), margin)
     classes = np.where(occupied, CELL_OCCUPIED, np.where(free, CELL_FREE, CELL_UNKNOWN)).astype(np.uint8)
     distance_m, nearest = _distance_to_walls(occupied, resolution_m)
     _, turned = _distance_to_walls(occupied[::-1, ::-1], resolution_m)
     wall_cells_m = _centres(occupied, margin, resolution_m)
+    step = max(1, round(FREE_SPACING_M / resolution_m))
     return PreparedMap(
         grid=cropped,
         classes=classes,
@@ -97,7 +103,9 @@ def prepare(grid: Grid, resolution_m: float, config: MergeConfig) -> PreparedMap
         nearest_wall_too=np.ascontiguousarray(max(len(wall_cells_m) - 1, 0) - turned[::-1, ::-1]),
         wall_cells_m=wall_cells_m,
         walls_m=thinned(wall_cells_m, config.search.wall_spacing_m),
-        free_m=_sampled(free, margin, resolution_m),
+        free_m=_sampled(free, margin, resolution_m, step),
+        wall_spacing_m=max(config.search.wall_spacing_m, resolution_m),
+        free_spacing_m=step * resolution_m,
         margin=margin,
     )
 
@@ -120,9 +128,8 @@ def _centres(mask: Mask, margin: int, resolution_m: float) -> Points:
     return cell_centres_m(rows - margin, cols - margin, resolution_m)
 
 
-def _sampled(free: Mask, margin: int, resolution_m: float) -> Points:
-    """One point per `FREE_SPACING_M` squared where the map is free."""
-    step = max(1, round(FREE_SPACING_M / resolution_m))
+def _sampled(free: Mask, margin: int, resolution_m: float, step: int) -> Points:
+    """Return the centre of every so many cells, along both axes, that is free."""
     rows, cols = np.nonzero(free[step // 2 :: step, step // 2 :: step])
     first = step // 2 - margin
     return cell_centres_m(rows * step + first, cols * step + first, resolution_m)

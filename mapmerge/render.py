@@ -16,6 +16,7 @@ Rgb = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
 MAX_SIDE_PX = 1024
+_BANNER_PX = 36
 
 _PAPER: Colour = (255, 255, 255)
 _INK: Colour = (60, 60, 60)
@@ -104,7 +105,7 @@ def _surface(evidence: SurfaceEvidence) -> Rgb:
     values = evidence.values
     low, high = float(np.percentile(values, 5)), float(values.max())
     scaled = np.clip((values - low) / (high - low) * 255 if high > low else values * 0, 0, 255)
-    zoom = MAX_SIDE_PX / max(values.shape)
+    zoom = (MAX_SIDE_PX - _BANNER_PX) / max(values.shape)
     size = (max(1, int(values.shape[1] * zoom)), max(1, int(values.shape[0] * zoom)))
     interpolation = cv2.INTER_AREA if zoom < 1 else cv2.INTER_LINEAR
     grey = cv2.resize(scaled.astype(np.uint8)[::-1], size, interpolation=interpolation)
@@ -113,8 +114,7 @@ def _surface(evidence: SurfaceEvidence) -> Rgb:
         cv2.circle(image, _pixel(row, col, values.shape, zoom), 9, _PAPER, 1, cv2.LINE_AA)
     if evidence.chosen is not None:
         cv2.circle(image, _pixel(*evidence.chosen, values.shape, zoom), 14, _MARK, 3, cv2.LINE_AA)
-    _banner(image, evidence.title)
-    return image
+    return _titled(image, evidence.title)
 
 
 def _pixel(row: int, col: int, shape: tuple[int, ...], zoom: float) -> tuple[int, int]:
@@ -126,7 +126,7 @@ def _overlay(evidence: OverlayEvidence) -> Rgb:
     target, source, pose = evidence.target, evidence.source, evidence.target_from_source
     corners = np.concatenate([_corners(target), pose.apply(_corners(source))])
     low, high = corners.min(axis=0) - 0.5, corners.max(axis=0) + 0.5
-    pixel_m = max(target.resolution_m / 2, float((high - low).max()) / MAX_SIDE_PX)
+    pixel_m = max(target.resolution_m / 2, float((high - low).max()) / (MAX_SIDE_PX - _BANNER_PX))
     cols, rows = (max(1, int(side / pixel_m)) for side in high - low)
 
     image = _ground(evidence, low, pixel_m, rows, cols)
@@ -145,8 +145,7 @@ def _overlay(evidence: OverlayEvidence) -> Rgb:
         disagree.append(at[violated])
     _dots(image, np.concatenate(agree), low, pixel_m, _AGREE)
     _dots(image, np.concatenate(disagree), low, pixel_m, _DISAGREE)
-    _banner(image, evidence.title)
-    return image
+    return _titled(image, evidence.title)
 
 
 def _corners(prepared: PreparedMap) -> Points:
@@ -183,11 +182,12 @@ def _dots(image: Rgb, points_m: Points, low: Points, pixel_m: float, colour: Col
         image[np.clip(row + down, 0, rows - 1), np.clip(col + right, 0, cols - 1)] = colour
 
 
-def _banner(image: Rgb, title: str) -> None:
-    """Write the title on a strip at the top, as large as fits."""
+def _titled(image: Rgb, title: str) -> Rgb:
+    """Return the picture below a strip with its title, which is as large as fits."""
     size = min(0.6, image.shape[1] / (len(title) * 16))
-    cv2.rectangle(image, (0, 0), (image.shape[1], int(36 * size / 0.6)), _PAPER, cv2.FILLED)
-    _text(image, title, (8, int(24 * size / 0.6)), size)
+    strip = np.full((max(1, round(_BANNER_PX * size / 0.6)), image.shape[1], 3), 255, np.uint8)
+    _text(strip, title, (8, int(24 * size / 0.6)), size)
+    return np.vstack([strip, image])
 
 
 def _text(image: Rgb, text: str, at: tuple[int, int], size: float, colour: Colour = _INK) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from mapmerge.config import VerifyConfig
 from mapmerge.grid import cell_centres_m
-from mapmerge.prepare import CELL_FREE, CELL_UNKNOWN, FREE_SPACING_M, PreparedMap
+from mapmerge.prepare import CELL_FREE, CELL_UNKNOWN, PreparedMap
 from mapmerge.sim2 import Points, Sim2
 
 
@@ -70,34 +70,31 @@ class Scores:
 
 
 def wall_agreement(target: PreparedMap, walls_m: Points, spacing_m: float, tolerance_m: float) -> WallAgreement:
-    """Return what walls, given in the target's grid frame, meet in the target."""
+    """Return what walls, one point a ``spacing_m``, given in the target's grid frame, meet in the target."""
+    tolerance_m = max(tolerance_m, target.resolution_m)
     index = target.flat_index(walls_m)
     matched = target.wall_distance_m.ravel()[index] <= tolerance_m
     violated = ~matched & (target.classes.ravel()[index] == CELL_FREE)
     return WallAgreement(float(np.count_nonzero(matched)) * spacing_m, float(np.count_nonzero(violated)) * spacing_m)
 
 
-def free_agreement_m2(target: PreparedMap, free_m: Points) -> float:
+def free_agreement_m2(target: PreparedMap, free_m: Points, spacing_m: float) -> float:
     """Return the area of free space, given in the target's grid frame, that is free in the target as well."""
     free = target.classes.ravel()[target.flat_index(free_m)] == CELL_FREE
-    return float(np.count_nonzero(free)) * FREE_SPACING_M**2
+    return float(np.count_nonzero(free)) * spacing_m**2
 
 
-def rank_score_m(
-    target: PreparedMap, source: PreparedMap, target_from_source: Sim2, spacing_m: float, config: VerifyConfig
-) -> float:
+def rank_score_m(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, config: VerifyConfig) -> float:
     """Return what candidates are ranked by: cheap, both directions, in metres of wall."""
-    ahead, back = _both_ways(target, source, target_from_source, spacing_m, config.tolerance_m)
-    free_m2 = free_agreement_m2(target, target_from_source.apply(source.free_m))
+    ahead, back = _both_ways(target, source, target_from_source, config.tolerance_m)
+    free_m2 = free_agreement_m2(target, target_from_source.apply(source.free_m), source.free_spacing_m)
     return _score(ahead, back, free_m2, config)
 
 
-def verify(
-    target: PreparedMap, source: PreparedMap, target_from_source: Sim2, spacing_m: float, config: VerifyConfig
-) -> Scores:
+def verify(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, config: VerifyConfig) -> Scores:
     """Return all that is known of a placement."""
-    ahead, back = _both_ways(target, source, target_from_source, spacing_m, config.tolerance_m)
-    free_m2 = free_agreement_m2(target, target_from_source.apply(source.free_m))
+    ahead, back = _both_ways(target, source, target_from_source, config.tolerance_m)
+    free_m2 = free_agreement_m2(target, target_from_source.apply(source.free_m), source.free_spacing_m)
     agree, disagree, both = cell_agreement(target, source, target_from_source)
     cell_m2 = source.resolution_m**2
     smaller_m2 = min(target.grid.known_area_m2, source.grid.known_area_m2)
@@ -130,12 +127,12 @@ def cell_agreement(target: PreparedMap, source: PreparedMap, target_from_source:
 
 
 def _both_ways(
-    target: PreparedMap, source: PreparedMap, target_from_source: Sim2, spacing_m: float, tolerance_m: float
+    target: PreparedMap, source: PreparedMap, target_from_source: Sim2, tolerance_m: float
 ) -> tuple[WallAgreement, WallAgreement]:
     source_from_target = target_from_source.inverse()
     return (
-        wall_agreement(target, target_from_source.apply(source.walls_m), spacing_m, tolerance_m),
-        wall_agreement(source, source_from_target.apply(target.walls_m), spacing_m, tolerance_m),
+        wall_agreement(target, target_from_source.apply(source.walls_m), source.wall_spacing_m, tolerance_m),
+        wall_agreement(source, source_from_target.apply(target.walls_m), target.wall_spacing_m, tolerance_m),
     )
 
 

@@ -59,9 +59,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("replay: interrupted; nothing was written", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
-        # whoever read our output has gone; keep Python from complaining about it at exit
+        # Whoever read our output has gone, and the files were written before any of it was printed; this keeps Python
+        # from complaining at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return EXIT_FAILED
+        return EXIT_DONE
     except Exception:  # noqa: BLE001 - a bug of ours must still end with a status and a word
         import traceback
 
@@ -150,7 +151,8 @@ def _input_arguments(parser: argparse.ArgumentParser) -> None:
     times.add_argument(
         "--start",
         metavar="TIME",
-        help="use maps from this time on: seconds after the first map, nanoseconds since 1970 with ns, or ISO 8601",
+        help="begin at this time, with the last map before it: seconds after the first map, nanoseconds since 1970 "
+        "with ns, or ISO 8601",
     )
     times.add_argument("--stop", metavar="TIME", help="use maps before this time")
     times.add_argument(
@@ -162,7 +164,7 @@ def _input_arguments(parser: argparse.ArgumentParser) -> None:
     times.add_argument(
         "--align-starts",
         action="store_true",
-        help="let recordings whose clocks cannot be the same begin together, on the reference's clock",
+        help="let all recordings begin together, on the reference's clock: for clocks that cannot be the same",
     )
 
 
@@ -205,8 +207,8 @@ def _run_options(options: argparse.Namespace) -> RunOptions:
         robots=_robots(options.robots),
         topics=tuple(TopicChoice.parse(text) for text in options.topic),
         clock=options.clock,
-        start=TimeBound.parse(options.start) if options.start else None,
-        stop=TimeBound.parse(options.stop) if options.stop else None,
+        start=TimeBound.parse(options.start) if options.start is not None else None,
+        stop=TimeBound.parse(options.stop) if options.stop is not None else None,
         reorder_window_ns=seconds_to_ns(options.reorder_window),
         align_starts=options.align_starts,
         strict=getattr(options, "strict", False),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from replay.codec import decode
@@ -12,7 +12,6 @@ from replay.errors import BadMessage, UsageError
 from replay.events import Clock
 from replay.messages import GridMessage, UpdateMessage
 from replay.options import NS_PER_S, ClockChoice
-from replay.selection import Selected
 from replay.sources.base import RawMessage, Source
 
 _MAX_GAP_NS = 86_400 * NS_PER_S
@@ -20,40 +19,52 @@ _MAX_GAP_NS = 86_400 * NS_PER_S
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """What the first usable message of a robot in one input says.
+    """What the first usable message of a topic in one input says.
 
     Parameters
     ----------
     clock
-        What its times are taken from.
+        What the topic's times are taken from.
     first_ns, last_ns
-        About when the robot's maps begin and end, by that clock; None for saved maps, which have no clock.
+        About when its messages begin and end, by that clock; None for saved maps, which have no clock.
+    first_log_ns, last_log_ns
+        The same by the recorder's clock.
     frame_id
         Its map frame as recorded.
     """
 
     robot: str
     input: int
+    topic: str
     clock: Clock
     first_ns: int | None
     last_ns: int | None
+    first_log_ns: int
+    last_log_ns: int
     frame_id: str
 
+    def by_log(self) -> Probe:
+        """Return the same by the recorder's clock; saved maps stay without one."""
+        if self.clock != "header":
+            return self
+        return replace(self, clock="log", first_ns=self.first_log_ns, last_ns=self.last_log_ns)
 
-def probe(source: Source, index: int, selected: Selected, choice: ClockChoice) -> Probe | None:
-    """Read the first usable message of a robot; None if there is none."""
+
+def probe(source: Source, index: int, robot: str, topic: str, choice: ClockChoice) -> Probe | None:
+    """Read the first usable message of a topic; None if there is none."""
     info = source.info
-    for raw in source.messages(selected.topics):
+    for raw in source.messages([topic]):
         try:
             message = decode(raw)
         except BadMessage:
             continue
+        log_ns, frame = raw.log_time_ns, message.frame_id
         if info.start_ns is None or info.stop_ns is None:
-            return Probe(selected.robot, index, "none", None, None, message.frame_id)
+            return Probe(robot, index, topic, "none", None, None, log_ns, log_ns, frame)
         clock: Clock = "header" if choice == "header" and message.stamp_ns > 0 else "log"
         first_ns = stamp_ns(clock, raw, message)
-        last_ns = first_ns + max(0, info.stop_ns - raw.log_time_ns)
-        return Probe(selected.robot, index, clock, first_ns, last_ns, message.frame_id)
+        last_log_ns = max(log_ns, info.stop_ns)
+        return Probe(robot, index, topic, clock, first_ns, first_ns + last_log_ns - log_ns, log_ns, last_log_ns, frame)
     return None
 
 
@@ -62,12 +73,10 @@ def stamp_ns(clock: Clock, raw: RawMessage, message: GridMessage | UpdateMessage
     return message.stamp_ns if clock == "header" else raw.log_time_ns
 
 
-def clock_of(probes: Sequence[Probe]) -> Clock:
-    """Return one robot's clock: the header's only if all of its inputs have it."""
-    clocks = [probe.clock for probe in probes if probe.clock != "none"]
-    if not clocks:
-        return "none" if probes else "header"
-    return "header" if all(clock == "header" for clock in clocks) else "log"
+def agreed(probes: Sequence[Probe]) -> list[Probe]:
+    """Return the probes with one clock for each topic of a robot: the header's only where all of its inputs have it."""
+    by_log = {(item.robot, item.topic) for item in probes if item.clock == "log"}
+    return [item.by_log() if (item.robot, item.topic) in by_log else item for item in probes]
 
 
 def frames(robots: Sequence[str], frame_ids: Mapping[str, str], merged_frame: str) -> dict[str, str]:
@@ -83,7 +92,7 @@ def frames(robots: Sequence[str], frame_ids: Mapping[str, str], merged_frame: st
 
 
 def offsets_ns(reference: str, probes: Sequence[Probe], *, align_starts: bool) -> dict[tuple[int, str], int]:
-    """Return what is added to the times of each input and robot, to have them on the reference's clock.
+    """Return what is added to the times of each input and topic, to have them on the reference's clock.
 
     Raises
     ------
@@ -98,12 +107,29 @@ def offsets_ns(reference: str, probes: Sequence[Probe], *, align_starts: bool) -
     if not align_starts:
         for item in timed:
             _refuse_other_clock(anchor, item)
-        return {(item.input, item.robot): 0 for item in timed}
-    groups: dict[tuple[int, Clock], list[Probe]] = {}
-    for item in timed:
-        groups.setdefault((item.input, item.clock), []).append(item)
-    start_ns = _first_ns(groups[anchor.input, anchor.clock])
-    return {(item.input, item.robot): start_ns - _first_ns(group) for group in groups.values() for item in group}
+        return {(item.input, item.topic): 0 for item in timed}
+    groups = _sharing_a_clock(timed)
+    start_ns = next(_first_ns(group) for group in groups if anchor in group)
+    return {(item.input, item.topic): start_ns - _first_ns(group) for group in groups for item in group}
+
+
+def _sharing_a_clock(probes: Sequence[Probe]) -> list[list[Probe]]:
+    """Group what one clock timed: all of one input, and all parts of one robot's recording."""
+    groups: list[list[Probe]] = []
+    for item in probes:
+        joined = [item]
+        others = []
+        for group in groups:
+            same = any(
+                item.clock == other.clock and (item.input == other.input or item.robot == other.robot)
+                for other in group
+            )
+            if same:
+                joined = [*group, *joined]
+            else:
+                others.append(group)
+        groups = [*others, joined]
+    return groups
 
 
 def _first_ns(group: Sequence[Probe]) -> int:

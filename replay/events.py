@@ -74,13 +74,14 @@ class Started:
 
 @dataclass(frozen=True, slots=True)
 class Skipped:
-    """A message could not be used."""
+    """A message could not be used; ``input`` is the name of the file or folder that it came from."""
 
     robot: str
     topic: str
     log_time_ns: int
     cause: SkipCause
     detail: str
+    input: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from replay.options import RunOptions
 from replay.plan import open_plan
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
+from replay.words import counted
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +141,7 @@ def lines(summary: RunSummary) -> Iterator[str]:
     """Yield the summary as lines to read."""
     for item in summary.inputs:
         duration = f"{item.duration_s:.1f} s" if item.duration_s is not None else "no clock"
-        yield f"{item.path}: {item.format}, {duration}, {_counted(item.messages)}"
+        yield f"{item.path}: {item.format}, {duration}, {counted(item.messages, 'message')}"
         yield from _columns([_row(topic) for topic in item.topics])
     if summary.problem is not None:
         yield f"nothing would be merged: {summary.problem}"
@@ -154,16 +155,12 @@ def _row(topic: TopicSummary) -> tuple[str, ...]:
     return (
         topic.name,
         topic.msgtype,
-        _counted(topic.messages) + (f" ({topic.unusable} unusable)" if topic.unusable else ""),
+        counted(topic.messages, "message") + (f" ({topic.unusable} unusable)" if topic.unusable else ""),
         sizes,
         ", ".join(f"{resolution:g} m" for resolution in topic.resolutions_m),
         f"frame {', '.join(topic.frames)}" if any(topic.frames) else "no frame",
         "header times" if topic.header_times else "log times only",
     )
-
-
-def _counted(messages: int) -> str:
-    return "1 message" if messages == 1 else f"{messages} messages"
 
 
 def _columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:

@@ -67,7 +67,7 @@ class TimeBound:
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """What is read and how it is merged: all that affects the result.
+    """What is read, how it is merged, and what is drawn of it.
 
     Parameters
     ----------
@@ -80,11 +80,11 @@ class RunOptions:
     clock
         What times are taken from, where the messages have it.
     start, stop
-        Only maps from ``start`` on and before ``stop`` are used.
+        Only maps from ``start`` on and before ``stop`` are used, and of each robot the last one before ``start``.
     reorder_window_ns
         Messages are put in order of time within this window.
     align_starts
-        Shift clocks that cannot be the same so that the robots start together.
+        Shift the clocks of all recordings so that the robots start together: for clocks that cannot be the same.
     strict
         Whether a message that cannot be used ends the run.
     images

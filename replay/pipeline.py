@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from time import perf_counter
 
+from mapmerge.errors import MapMergeError
 from mapmerge.merger import MergeState, step
 from replay import __version__
+from replay.arrivals import Tally
+from replay.errors import InputError
 from replay.events import Event, Finished, Merged, Skipped, Started, Timing
 from replay.gallery import Gallery
 from replay.options import RunOptions
 from replay.plan import Plan, open_plan
 from replay.report import ReportBuilder
 from replay.sinks.base import Sink
-from replay.timeline import Tally, ticks
+from replay.timeline import ticks
 
 
 def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
@@ -33,7 +36,10 @@ def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
             yield tick
             continue
         begin = perf_counter()
-        state, result = step(state, tick.grids, options.merge)
+        try:
+            state, result = step(state, tick.grids, options.merge)
+        except MapMergeError as error:
+            raise InputError(f"the maps of {', '.join(tick.grids)} at {tick.stamp_ns} ns: {error}") from error
         merged = perf_counter()
         pictures = gallery.due(result)
         timing = Timing(merged - begin, perf_counter() - merged)

@@ -8,17 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from replay.clocks import Probe, clock_of, frames, offsets_ns, probe
+from replay.arrivals import Feed, Tally, Window
+from replay.clocks import Probe, agreed, frames, offsets_ns, probe
 from replay.errors import UsageError
-from replay.events import RobotInput
-from replay.options import RunOptions
+from replay.events import Clock, RobotInput
+from replay.options import NS_PER_S, RunOptions
 from replay.selection import Selected, select
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
-from replay.timeline import Feed, Tally, Window
 
 MERGED_FRAME = "merged"
-_MAP_TYPES = (GRID_TYPE, UPDATE_TYPE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +49,7 @@ class Plan:
                 "format": info.format,
                 "size_bytes": _size_bytes(feed.source.path),
                 "robots": sorted(set(feed.robot_of.values())),
-                "clocks": {robot: feed.clocks[robot] for robot in sorted(set(feed.robot_of.values()))},
+                "clocks": dict(sorted(feed.clocks.items())),
                 "offsets_ns": dict(sorted(feed.offsets_ns.items())),
                 "messages": tally.messages if tally else None,
                 "late": tally.late if tally else None,
@@ -79,62 +78,84 @@ def open_plan(options: RunOptions) -> Iterator[Plan]:
 def _plan(sources: list[Source], options: RunOptions) -> Plan:
     infos = tuple(source.info for source in sources)
     selected = select(options.runs, infos, robots=options.robots, topics=options.topics)
-    probes = [
-        found
-        for item in selected
-        for index in item.inputs
-        if (found := probe(sources[index], index, item, options.clock)) is not None
-    ]
-    clocks = {item.robot: clock_of([p for p in probes if p.robot == item.robot]) for item in selected}
-    probes = [_on_clock(p, clocks[p.robot], infos[p.input]) for p in probes]
+    probes = agreed(_probes(sources, infos, selected, options))
     offsets = offsets_ns(selected[0].robot, probes, align_starts=options.align_starts)
-    start_ns = _first_ns(probes, offsets)
+    start_ns, stop_ns = _span_ns(probes, offsets)
     window = Window(
         options.start.absolute_ns(start_ns) if options.start else None,
         options.stop.absolute_ns(start_ns) if options.stop else None,
         options.reorder_window_ns,
     )
-    if window.start_ns is not None and window.stop_ns is not None and window.start_ns >= window.stop_ns:
-        raise UsageError("--stop is not after --start, so that no map would be used; give a later --stop")
+    _refuse_empty(window, start_ns, stop_ns)
     return Plan(
         infos,
-        _robots(selected, probes, clocks, infos),
-        _feeds(sources, selected, clocks, offsets, window, start_ns),
+        _robots(selected, probes, infos),
+        _feeds(
+            sources, selected, probes, offsets, start_ns if window.start_ns is None else max(start_ns, window.start_ns)
+        ),
         window,
     )
 
 
-def _on_clock(item: Probe, clock: str, info: SourceInfo) -> Probe:
-    """Return the probe by the robot's clock where another of its inputs lacks header stamps."""
-    if item.clock != "header" or clock == "header" or info.start_ns is None:
-        return item
-    return Probe(item.robot, item.input, "log", info.start_ns, info.stop_ns, item.frame_id)
+def _refuse_empty(window: Window, start_ns: int, stop_ns: int) -> None:
+    """Refuse a window in which there is no map."""
+    first_ns = start_ns if window.start_ns is None else window.start_ns
+    if window.stop_ns is not None and window.stop_ns <= first_ns:
+        raise UsageError("--stop is not after --start or the first map, so that no map would be used; give a later one")
+    if first_ns > stop_ns:
+        span_s = (stop_ns - start_ns) / NS_PER_S
+        raise UsageError(
+            f"--start is after all maps, which end {span_s:.1f} s after the first one; give an earlier one"
+        )
 
 
-def _first_ns(probes: list[Probe], offsets: Mapping[tuple[int, str], int]) -> int:
-    times = [item.first_ns + offsets[item.input, item.robot] for item in probes if item.first_ns is not None]
-    return min(times, default=0)
+def _probes(
+    sources: list[Source], infos: tuple[SourceInfo, ...], selected: tuple[Selected, ...], options: RunOptions
+) -> list[Probe]:
+    """Read the first message of each topic, the robots in order, each robot's map first."""
+    return [
+        found
+        for item in selected
+        for topic in item.topics
+        for index in item.inputs
+        if _carries_maps(infos[index], topic)
+        and (found := probe(sources[index], index, item.robot, topic, options.clock)) is not None
+    ]
+
+
+def _carries_maps(info: SourceInfo, topic: str) -> bool:
+    return any(item.name == topic and item.msgtype in (GRID_TYPE, UPDATE_TYPE) for item in info.topics)
+
+
+def _span_ns(probes: list[Probe], offsets: Mapping[tuple[int, str], int]) -> tuple[int, int]:
+    """Return about when the first and the last map of the run are; zeros if none has a time."""
+    shifts = [(item, offsets.get((item.input, item.topic), 0)) for item in probes]
+    first = [item.first_ns + shift for item, shift in shifts if item.first_ns is not None]
+    last = [item.last_ns + shift for item, shift in shifts if item.last_ns is not None]
+    return min(first, default=0), max(last, default=0)
 
 
 def _robots(
-    selected: tuple[Selected, ...], probes: list[Probe], clocks: Mapping[str, Any], infos: tuple[SourceInfo, ...]
+    selected: tuple[Selected, ...], probes: list[Probe], infos: tuple[SourceInfo, ...]
 ) -> tuple[RobotInput, ...]:
     frame_ids: dict[str, str] = {}
+    clocks: dict[str, Clock] = {}
     for item in probes:
         frame_ids.setdefault(item.robot, item.frame_id)
+        clocks.setdefault(item.robot, item.clock)
     named = frames([item.robot for item in selected], frame_ids, MERGED_FRAME)
     return tuple(
         RobotInput(
             robot=item.robot,
             topic=item.topic,
             frame=named[item.robot],
-            clock=clocks[item.robot],
+            clock=clocks.get(item.robot, "header"),
             inputs=item.inputs,
             message_count=sum(
                 topic.message_count
                 for index in item.inputs
                 for topic in infos[index].topics
-                if topic.name in item.topics and topic.msgtype in _MAP_TYPES
+                if topic.name in item.topics and topic.msgtype in (GRID_TYPE, UPDATE_TYPE)
             ),
         )
         for item in selected
@@ -144,22 +165,26 @@ def _robots(
 def _feeds(
     sources: list[Source],
     selected: tuple[Selected, ...],
-    clocks: Mapping[str, Any],
+    probes: list[Probe],
     offsets: Mapping[tuple[int, str], int],
-    window: Window,
-    start_ns: int,
+    untimed_ns: int,
 ) -> tuple[Feed, ...]:
-    untimed_ns = start_ns if window.start_ns is None else max(start_ns, window.start_ns)
+    clocks = {(item.input, item.topic): item.clock for item in probes}
     feeds = []
     for index, source in enumerate(sources):
-        own = [item for item in selected if index in item.inputs]
-        names = {topic.name for topic in source.info.topics if topic.msgtype in _MAP_TYPES}
+        robot_of = {
+            topic: item.robot
+            for item in selected
+            if index in item.inputs
+            for topic in item.topics
+            if _carries_maps(source.info, topic)
+        }
         feeds.append(
             Feed(
                 source=source,
-                robot_of={topic: item.robot for item in own for topic in item.topics if topic in names},
-                clocks={item.robot: "none" if source.info.start_ns is None else clocks[item.robot] for item in own},
-                offsets_ns={item.robot: offsets.get((index, item.robot), 0) for item in own},
+                robot_of=robot_of,
+                clocks={topic: clocks.get((index, topic), "header") for topic in robot_of},
+                offsets_ns={topic: offsets.get((index, topic), 0) for topic in robot_of},
                 untimed_ns=untimed_ns,
             )
         )

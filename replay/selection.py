@@ -11,7 +11,8 @@ from pathlib import Path
 from replay.errors import InputError, UsageError
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, SourceInfo
 
-_NOT_A_MAP = re.compile(r"costmap|mask|keepout|speed", re.IGNORECASE)
+_NOT_A_MAP = re.compile(r"(^|[/_])(costmap|mask|keepout|speed)([/_]|$)", re.IGNORECASE)
+_SUFFIXES = (".zstd", ".bag", ".db3", ".mcap", ".yaml", ".yml")
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 
 
@@ -26,9 +27,13 @@ class RunPath:
     def parse(text: str) -> RunPath:
         """Read ``PATH`` or ``ROBOT=PATH``; a path that exists is a path even if it has an equals sign."""
         name, sign, rest = text.partition("=")
-        if sign and rest and _NAME.fullmatch(name) and not Path(text).exists():
+        if not sign or Path(text).exists():
+            return RunPath(None, Path(text))
+        if rest and _NAME.fullmatch(name):
             return RunPath(name, Path(rest))
-        return RunPath(None, Path(text))
+        if not rest or not Path(rest).exists():
+            return RunPath(None, Path(text))
+        raise UsageError(f"{text}: {name!r} is no name for a robot; expected letters, digits, '_', '-' and '.'")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +47,11 @@ class TopicChoice:
     def parse(text: str) -> TopicChoice:
         """Read ``/{robot}/map`` or ``r1=/x``."""
         name, sign, rest = text.partition("=")
-        return TopicChoice(name, rest) if sign else TopicChoice(None, text)
+        if not sign:
+            name, rest = "", text
+        if not rest or (sign and not name):
+            raise UsageError(f"--topic {text}: expected a topic such as '/{{robot}}/map', or r1=/r1/map for one robot")
+        return TopicChoice(name or None, rest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +101,9 @@ def select(
     found = _discovered(runs, infos, topics, counts)
     there = _flags(found or _discovered(runs, infos, (), counts))
     wanted = list(robots) if robots is not None else _all_names(runs, found)
+    unused = sorted({choice.robot for choice in topics if choice.robot is not None} - set(wanted))
+    if unused:
+        raise UsageError(f"--topic names {', '.join(unused)}, which --robots does not; add it there, or leave it out")
     if not wanted:
         said = " ".join(f"--topic {choice.topic}" for choice in topics)
         raise UsageError(f"{said}: there is no map that fits; there are: {there}")
@@ -118,8 +130,9 @@ def _discovered(
 ) -> dict[str, Candidates]:
     """Return for each robot that can be named the map topics that may be its own."""
     found: dict[str, Candidates] = {}
+    file_names = _file_names(runs)
     for index, (run, info) in enumerate(zip(runs, infos, strict=True)):
-        names = _names_in(run, _grid_topics(info), topics)
+        names = _names_in(run, file_names[index], _grid_topics(info), topics)
         for topic, robot in names.items():
             if _chosen(robot, topic, topics):
                 candidates = found.setdefault(robot, {})
@@ -127,14 +140,30 @@ def _discovered(
     for choice in topics:
         if choice.robot is not None:
             found[choice.robot] = _said_outright(choice, runs, infos)
+            found = _without_claimed(found, choice)
     best = {robot: _best(robot, candidates, counts) for robot, candidates in found.items()}
     asked = {run.robot for run in runs} | {choice.robot for choice in topics}
     maps = {robot for robot, candidates in best.items() if not all(map(_NOT_A_MAP.search, candidates))}
     return {robot: candidates for robot, candidates in best.items() if not maps or robot in maps | asked}
 
 
-def _names_in(run: RunPath, topics: Sequence[str], choices: Sequence[TopicChoice]) -> dict[str, str]:
-    """Return the robot of each map topic of one input."""
+def _without_claimed(found: Mapping[str, Candidates], choice: TopicChoice) -> dict[str, Candidates]:
+    """Take a topic that was said to be one robot's from the robot that it was found to be of."""
+    claimed = set(found[str(choice.robot)][choice.topic])
+    left: dict[str, Candidates] = {}
+    for robot, candidates in found.items():
+        kept = {
+            topic: inputs
+            for topic, inputs in candidates.items()
+            if robot == choice.robot or topic != choice.topic or not claimed & set(inputs)
+        }
+        if kept:
+            left[robot] = kept
+    return left
+
+
+def _names_in(run: RunPath, file_name: str, topics: Sequence[str], choices: Sequence[TopicChoice]) -> dict[str, str]:
+    """Return the robot of each map topic of one input; ``file_name`` names one whose topics have no namespace."""
     if run.robot is not None:
         return dict.fromkeys(topics, run.robot)
     patterns = [choice.topic for choice in choices if choice.robot is None and "{robot}" in choice.topic]
@@ -144,7 +173,7 @@ def _names_in(run: RunPath, topics: Sequence[str], choices: Sequence[TopicChoice
     if any(not _NOT_A_MAP.search(topic) for topic in named):
         return _named_by_namespace(named)
     bare = [topic for topic in topics if not _namespace(topic)]
-    return dict.fromkeys(bare, _stem(run.path)) if bare else _named_by_namespace(named)
+    return dict.fromkeys(bare, file_name) if bare else _named_by_namespace(named)
 
 
 def _named_by_patterns(topics: Sequence[str], patterns: Sequence[str]) -> dict[str, str]:
@@ -175,9 +204,20 @@ def _namespace(topic: str) -> list[str]:
     return [part for part in topic.split("/") if part][:-1]
 
 
-def _stem(path: Path) -> str:
-    name = path.resolve().name.removesuffix(".zstd")
-    return re.sub(r"[^A-Za-z0-9_.-]", "_", name.partition(".")[0] or name)
+def _file_names(runs: Sequence[RunPath]) -> list[str]:
+    """Name robots by their files where nothing else does: two of one name have their folder's name in front."""
+    paths = [run.path.resolve() for run in runs]
+    stems = [_stem(path.name) for path in paths]
+    return [
+        f"{_stem(path.parent.name)}_{stem}" if stems.count(stem) > 1 else stem
+        for path, stem in zip(paths, stems, strict=True)
+    ]
+
+
+def _stem(name: str) -> str:
+    for suffix in _SUFFIXES:
+        name = name.removesuffix(suffix)
+    return re.sub(r"[^A-Za-z0-9_.-]", "_", name)
 
 
 def _chosen(robot: str, topic: str, topics: Sequence[TopicChoice]) -> bool:

@@ -60,7 +60,7 @@ SCENARIOS: dict[str, Scenario] = {
     ),
     "nothing_known": Scenario(
         lambda: [seen("r1", 0.0, _nothing()), seen("r2", 1.0)],
-        lambda last: last.result.merged is not None and last.result.merged.cells.size == 0,
+        lambda last: last.result.merged is None and _statuses(last) == ["no_map", "unmerged"],
         images="all",
     ),
     "no_map_at_all": Scenario(

@@ -54,8 +54,9 @@ class CorrelationMatcher:
     def prepare(self, grid: Grid, resolution_m: float, config: MergeConfig) -> _Prepared:
         """Return the walls, distances and orientation spectrum of one map."""
         prepared = prepare(grid, resolution_m, config)
-        search = config.search
-        return _Prepared(prepared, orientation_spectrum(prepared.walls_m, search.angle_step_rad, search.wall_spacing_m))
+        return _Prepared(
+            prepared, orientation_spectrum(prepared.walls_m, config.search.angle_step_rad, prepared.wall_spacing_m)
+        )
 
     def match(self, target: _Prepared, source: _Prepared, config: MergeConfig) -> Match:
         """Return the best placement of the source on the target, accepted or refused."""
@@ -69,7 +70,7 @@ class CorrelationMatcher:
             reason = Reason(ReasonCode.NO_CANDIDATE, "no placement lets walls of the two maps coincide")
             return Match(None, None, accepted=False, reason=reason, evidence=(_spectra(target, source, rotations),))
         best = _polished(candidates[0], target.map, source.map, config)
-        scores = verify(target.map, source.map, best.target_from_source, config.search.wall_spacing_m, config.verify)
+        scores = verify(target.map, source.map, best.target_from_source, config.verify)
         others = candidates[1:]
         if judge(scores, None, config.verify).code is ReasonCode.ACCEPTED:
             others = [*others, *_beside(best, target.map, source.map, config)]
@@ -135,7 +136,7 @@ def _down(value: float, digits: int) -> float:
 
 def _too_little_structure(target: PreparedMap, source: PreparedMap, config: MergeConfig) -> Reason | None:
     """Return a refusal if one of the maps has fewer walls than a placement must match."""
-    least_m = min(len(target.walls_m), len(source.walls_m)) * config.search.wall_spacing_m
+    least_m = min(len(prepared.walls_m) * prepared.wall_spacing_m for prepared in (target, source))
     if least_m >= config.verify.min_matched_wall_m:
         return None
     message = f"one of the maps shows {least_m:.1f} m of wall, less than {config.verify.min_matched_wall_m:g} m"
@@ -151,11 +152,10 @@ def _candidates(
     found = [(peak, surface) for surface in surfaces for peak in surface_peaks(surface, config.search)]
     found.sort(key=lambda item: -item[0].value)
     walls_m = evenly(source.walls_m, config.refine.max_points)
-    spacing_m = config.search.wall_spacing_m
     candidates = []
     for peak, surface in found[: config.search.max_candidates]:
         pose = refine(target, walls_m, peak.target_from_source, config.refine)
-        score_m = rank_score_m(target, source, pose, spacing_m, config.verify)
+        score_m = rank_score_m(target, source, pose, config.verify)
         candidates.append(_Candidate(pose, score_m, surface, peak))
     candidates.sort(key=lambda candidate: -candidate.score_m)
     return candidates
@@ -164,7 +164,7 @@ def _candidates(
 def _polished(best: _Candidate, target: PreparedMap, source: PreparedMap, config: MergeConfig) -> _Candidate:
     """Return the best candidate, aligned to a fraction of a cell."""
     pose = polish(target, source.wall_cells_m, best.target_from_source, config.refine)
-    score_m = rank_score_m(target, source, pose, config.search.wall_spacing_m, config.verify)
+    score_m = rank_score_m(target, source, pose, config.verify)
     return replace(best, target_from_source=pose, score_m=score_m)
 
 
@@ -181,7 +181,7 @@ def _beside(best: _Candidate, target: PreparedMap, source: PreparedMap, config: 
         shift = Sim2(reach_m * math.cos(angle_rad), reach_m * math.sin(angle_rad))
         pose = refine(target, walls_m, shift @ best.target_from_source, config.refine)
         if not _same_place(best.target_from_source, pose, source, config.verify):
-            score_m = rank_score_m(target, source, pose, config.search.wall_spacing_m, config.verify)
+            score_m = rank_score_m(target, source, pose, config.verify)
             found.append(_Candidate(pose, score_m, best.surface, best.peak))
     return found
 

@@ -52,8 +52,9 @@ class TranslationSearch:
         self._config = config
         self._source = source
         self._reach_m = float(np.hypot(*source.extent_m))
-        width_m, height_m = target.extent_m
-        cols, rows = (int(np.ceil((side + self._reach_m) / config.cell_m)) + 4 for side in (width_m, height_m))
+        sides_m = [side_m + self._reach_m for side_m in target.extent_m]
+        self._cell_m = max(config.cell_m, target.resolution_m, max(sides_m) / config.max_side_cells)
+        cols, rows = (int(np.ceil(side_m / self._cell_m)) + 4 for side_m in sides_m)
         self._shape = (cv2.getOptimalDFTSize(rows), cv2.getOptimalDFTSize(cols))
         walls = cv2.GaussianBlur(self._raster(target.walls_m), (3, 3), 0.0)
         free = self._raster(target.free_m).astype(bool).astype(np.float32)
@@ -75,15 +76,15 @@ class TranslationSearch:
         product -= self._config.free_weight * self._walls_spectrum * np.conj(np.fft.rfft2(free))
         values = np.fft.irfft2(product, self._shape).astype(np.float32)
         # shifts are cyclic: roll so that the most negative one comes first
-        back = tuple(min(size - 1, int(np.ceil(self._reach_m / self._config.cell_m)) + 2) for size in self._shape)
-        cell_m = self._config.cell_m
+        back = tuple(min(size - 1, int(np.ceil(self._reach_m / self._cell_m)) + 2) for size in self._shape)
+        cell_m = self._cell_m
         origin_m = (-back[1] * cell_m - float(low[0]), -back[0] * cell_m - float(low[1]))
-        scale = np.float32(self._config.wall_spacing_m)
+        scale = np.float32(self._source.wall_spacing_m)
         return CorrelationSurface(yaw_rad, np.roll(values, back, axis=(0, 1)) * scale, origin_m, cell_m)
 
     def _raster(self, points_m: Points) -> Surface:
         rows, cols = self._shape
-        cell = np.floor(points_m / self._config.cell_m).astype(np.intp)
+        cell = np.floor(points_m / self._cell_m).astype(np.intp)
         index = np.clip(cell[:, 1], 0, rows - 1) * cols + np.clip(cell[:, 0], 0, cols - 1)
         return np.bincount(index, minlength=rows * cols).astype(np.float32).reshape(rows, cols)
 

@@ -10,14 +10,16 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mcap.exceptions import McapError
 from mcap.writer import CompressionType, Writer
 
-from mapmerge.grid import Grid
+from mapmerge.grid import UNKNOWN, Grid
 from mapmerge.merger import MergeResult
 from replay import __version__
 from replay.codec import (
@@ -107,6 +109,9 @@ class McapSink:
 
     def _map(self, stamp_ns: int, merged: Grid | None) -> None:
         """Write the merged map if it changed, at once or, when the last one is too recent, later."""
+        if merged is None and self._merged is not None:
+            # a map that was offered as latched would stand for ever: take it back
+            merged = replace(self._merged, cells=np.full_like(self._merged.cells, UNKNOWN))
         if merged is not None and merged.cells.size and not (self._merged and merged.same_as(self._merged)):
             self._merged = merged
             self._pending_map = (stamp_ns, merged)
@@ -147,10 +152,9 @@ class McapSink:
             self._pending_report = None
 
     def _end(self, report: Report) -> None:
-        if self._pending_report is not None:
-            stamp_ns, _ = self._pending_report
-            self._flush_map(stamp_ns)
-            self._pending_report = (stamp_ns, report)
+        stamp_ns = self._pending_report[0] if self._pending_report else 0
+        self._flush_map(stamp_ns)
+        self._pending_report = (stamp_ns, report)
         self._flush_report()
         self._channels.metadata("replay.inputs", {"inputs": _compact(report["inputs"])})
 

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from replay.events import Event, Merged, Report, Skipped, Started
+from replay.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
 _WIDTH_WHERE_NO_TERMINAL = 400
+_SKIPPED_NAMED = 5
 _STYLES = {"reference": "bold", "merged": "green", "unmerged": "yellow", "no_map": "red"}
 
 
@@ -73,6 +76,7 @@ class Narrator:
         self._merge_s = 0.0
         self._render_s = 0.0
         self._ticks = 0
+        self._skipped: Counter[str] = Counter()
 
     def take(self, event: Event) -> None:
         """Say what is worth a line, and add up the time."""
@@ -80,22 +84,30 @@ class Narrator:
             reference, *others = (f"{item.robot} ({item.topic})" for item in event.robots)
             self._say(f"merging {', '.join(others) or 'nothing else'} into {reference}, the reference")
         elif isinstance(event, Skipped):
-            self._say(f"skipped a message of {event.topic} at {event.log_time_ns} ns: {event.cause}: {event.detail}")
+            self._say_skipped(event)
         elif isinstance(event, Merged):
             self._merge_s += event.timing.merge_s
             self._render_s += event.timing.render_s
             self._ticks += 1
+
+    def _say_skipped(self, event: Skipped) -> None:
+        """Name the first few of each cause; `sum_up` counts them all."""
+        self._skipped[event.cause] += 1
+        if self._skipped[event.cause] <= _SKIPPED_NAMED:
+            where = f"{event.input}, {event.topic}, {event.log_time_ns} ns"
+            self._say(f"skipped a message ({where}): {event.cause}: {event.detail}")
 
     def sum_up(self, report: Report, paths: Sequence[str]) -> None:
         """Say what was skipped, how long it took, and what was written."""
         skipped, late = sum(report["skipped"].values()), sum(item["late"] for item in report["inputs"])
         if skipped:
             causes = ", ".join(f"{count} {cause}" for cause, count in report["skipped"].items())
-            self._say(f"{skipped} messages were skipped: {causes}")
+            self._say(f"{counted(skipped, 'message')} skipped: {causes}")
         if late:
-            self._say(f"{late} messages came too late to be put in order of time and took effect on arrival")
+            self._say(f"{counted(late, 'message')} too late to be put in order of time: taken in on arrival")
+        spent_s = perf_counter() - self._begin_s
         self._say(
-            f"{report['updates']} maps at {self._ticks} times in {perf_counter() - self._begin_s:.1f} s: "
+            f"{counted(report['updates'], 'map')} at {counted(self._ticks, 'time')} in {spent_s:.1f} s: "
             f"{self._merge_s:.1f} s merging, {self._render_s:.1f} s drawing; wrote {', '.join(paths)}"
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,6 +33,14 @@ TEXT_MODE = (
     " (Git: mark it `binary` in .gitattributes)"
 )
 
+# The machine's limits, which say nothing about the recording.
+_LIMITS = {
+    errno.EMFILE: "raise the limit (`ulimit -n`), or give fewer recordings at once",
+    errno.ENFILE: "close other programs, or raise the limit of the system",
+    # Only decompressed copies are written.
+    errno.ENOSPC: "free space in the temporary folder, or name another in the environment variable TMPDIR",
+}
+
 
 @contextmanager
 def translated(path: Path, foreign: tuple[type[Exception], ...] = COMMON, *, part: str = "") -> Iterator[None]:
@@ -53,6 +62,8 @@ def translated(path: Path, foreign: tuple[type[Exception], ...] = COMMON, *, par
 def _line(path: Path, error: Exception, part: str) -> str:
     if isinstance(error, PermissionError):
         return f"{error.filename or path}: permission denied; make it readable for you and try again"
+    if isinstance(error, OSError) and error.errno in _LIMITS:
+        return f"{path}: it cannot be read: {error.strerror}; {_LIMITS[error.errno]} and try again"
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename or path}: {error.strerror}; expected a recording that can be read"
     name, text = type(error).__name__, " ".join(str(error).split())

@@ -6,7 +6,9 @@ A saved map counts as a recording of one message at time 0.
 from __future__ import annotations
 
 import functools
+import math
 import re
+import reprlib
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +33,7 @@ _REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free
 _MODES: tuple[Mode, ...] = get_args(Mode)
 _TRUE = {"true", "yes", "on", "y"}
 _FALSE = {"false", "no", "off", "n"}
+_MAX_RESOLUTION_M = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,18 +101,14 @@ def _description(path: Path) -> _Description:
     image = path.parent / str(document["image"])
     if not image.is_file():
         raise InputError(f"{path}: its image {image} does not exist; copy it to that place, or correct 'image'")
-    origin = document["origin"]
-    if not isinstance(origin, list) or len(origin) != 3:
-        raise InputError(f"{path}: 'origin' is {origin}; expected [x, y, yaw] in metres and radians")
-    x_m, y_m, yaw_rad = (_number(path, "origin", each) for each in origin)
     return _Description(
         image,
-        _number(path, "resolution", document["resolution"]),
-        Sim2(x_m, y_m, yaw_rad),
+        _resolution_m(path, document["resolution"]),
+        _origin(path, document["origin"]),
         _mode(path, document),
         Thresholds(
-            _number(path, "occupied_thresh", document["occupied_thresh"]),
-            _number(path, "free_thresh", document["free_thresh"]),
+            _fraction(path, "occupied_thresh", document["occupied_thresh"]),
+            _fraction(path, "free_thresh", document["free_thresh"]),
             _flag(path, document["negate"]),
         ),
     )
@@ -124,12 +123,40 @@ def _document(path: Path) -> dict[str, Any]:
     return document
 
 
-def _number(path: Path, key: str, value: object) -> float:
-    """Return a number; YAML 1.2 takes some that the map server reads, such as 5e-2, for text."""
+def _wrong(path: Path, key: str, value: object, expected: str) -> InputError:
+    return InputError(f"{path}: '{key}' is {reprlib.repr(value)}; expected {expected}: correct '{key}' in this file")
+
+
+def _number(value: object) -> float:
+    """Return a number, NaN for what is none; YAML 1.2 takes some that the map server reads, such as 5e-2, for text."""
+    if isinstance(value, bool):
+        return math.nan
     try:
         return float(cast("str", value))
-    except (TypeError, ValueError):
-        raise InputError(f"{path}: '{key}' holds {value!r}; a number was expected") from None
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
+def _resolution_m(path: Path, value: object) -> float:
+    number = _number(value)
+    # As a message holds it: with 32 bits.
+    if 0.0 < number <= _MAX_RESOLUTION_M and np.float32(number) > 0.0:
+        return number
+    raise _wrong(path, "resolution", value, "a positive number of metres per pixel, such as 0.05")
+
+
+def _origin(path: Path, value: object) -> Sim2:
+    numbers = [_number(each) for each in value] if isinstance(value, list) else []
+    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+        raise _wrong(path, "origin", value, "[x, y, yaw], three numbers in metres and radians")
+    return Sim2(*numbers)
+
+
+def _fraction(path: Path, key: str, value: object) -> float:
+    number = _number(value)
+    if 0.0 <= number <= 1.0:
+        return number
+    raise _wrong(path, key, value, "a number from 0 to 1")
 
 
 def _flag(path: Path, value: object) -> bool:
@@ -138,7 +165,7 @@ def _flag(path: Path, value: object) -> bool:
         return text in _TRUE
     if isinstance(value, int):
         return value != 0
-    raise InputError(f"{path}: 'negate' is {value}; expected 0 or 1")
+    raise _wrong(path, "negate", value, "0 or 1")
 
 
 def _mode(path: Path, document: dict[str, Any]) -> Mode:
@@ -146,7 +173,7 @@ def _mode(path: Path, document: dict[str, Any]) -> Mode:
     for mode in _MODES:
         if mode == name:
             return mode
-    raise InputError(f"{path}: 'mode' is {document['mode']}; expected one of {', '.join(_MODES)}")
+    raise _wrong(path, "mode", document["mode"], f"one of {', '.join(_MODES)}")
 
 
 def _pixels(path: Path, image: Path) -> Pixels:

@@ -29,15 +29,22 @@ _MAGIC_IN_TEXT_MODE = (b"\x89MCAP0\n", b"\x89MCAP0\r\r\n", b"\xef\xbf\xbdMCAP0")
 class McapFile(Closing):
     """An MCAP file, whichever of chunks, compression, indexes and summary it has.
 
-    Without a complete summary the file is read twice: once to find the maps, once to read them.
+    Without a complete summary and message indexes the file is read twice: once to find the maps, once to read them.
 
     Parameters
     ----------
     copy_of
         The file of which ``path`` is a decompressed copy, to be named in errors.
+    map_scan
+        What the `map_scan` of this same file was when it was open before, so that its maps are not looked for again.
+
+    Attributes
+    ----------
+    map_scan
+        What a pass through the file found of its maps; None as long as no pass was needed.
     """
 
-    def __init__(self, path: Path, copy_of: Path | None = None) -> None:
+    def __init__(self, path: Path, copy_of: Path | None = None, map_scan: Scan | None = None) -> None:
         self.path = copy_of or path
         with ExitStack() as stack, translated(self.path, foreign_errors()):
             file = stack.enter_context(path.open("rb"))
@@ -45,12 +52,8 @@ class McapFile(Closing):
                 raise InputError(f"{self.path}: it begins like an MCAP file {TEXT_MODE}")
             self._file = RecordFile(self.path, file, path.stat().st_size)
             self._summary = read_summary(self._file)
-            self._scan: Scan | None = None
-            if self._summary:
-                self._contents = self._summary.contents
-            else:
-                self._scan = scan(self._file, lambda channel: channel.is_map)
-                self._contents = self._scan.contents
+            self.map_scan = map_scan
+            self._contents = self._summary.contents if self._summary else self._scanned().contents
             self._resources = stack.pop_all()
 
     @classmethod
@@ -94,14 +97,23 @@ class McapFile(Closing):
 
     def _entries(self, wanted: Mapping[int, Channel]) -> tuple[Entry, ...]:
         """Return where the messages of these channels are, sorted."""
-        if self._summary:
+        channels = set(wanted.values())
+        only_maps = all(channel.is_map for channel in channels)
+        if self._summary and not (only_maps and self.map_scan):
             found = indexed_entries(self._file, self._summary, wanted)
             if found is not None:
                 return found
-        elif self._scan and all(each.is_map for each in wanted.values()):
-            return tuple(entry for entry in self._scan.entries if entry.channel in wanted)
-        channels = set(wanted.values())
-        return scan(self._file, lambda channel: channel in channels).entries
+        if not only_maps:
+            return scan(self._file, lambda channel: channel in channels).entries
+        known = self._scanned()
+        # By what the pass found, not by the keys of the summary, which may lack one: no message is left out in silence.
+        return tuple(entry for entry in known.entries if known.contents.channels[entry.channel] in channels)
+
+    def _scanned(self) -> Scan:
+        """Return what a pass through the file finds of its maps. It is made once, whatever is asked for first."""
+        if self.map_scan is None:
+            self.map_scan = scan(self._file, lambda channel: channel.is_map)
+        return self.map_scan
 
     def _data(self, entry: Entry, chunks: ChunkCache) -> bytes:
         """Return the data of a message, once its record proves to be the one looked for."""

@@ -5,16 +5,17 @@ from __future__ import annotations
 import functools
 import heapq
 import re
-from collections.abc import Collection, Iterator, Sequence
-from contextlib import ExitStack
+from collections.abc import Collection, Generator, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path, PureWindowsPath
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Protocol
 
 from replay.errors import InputError
 from replay.sources.base import RawMessage, Source, SourceInfo
 from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.mcap_file import McapFile
+from replay.sources.mcap_index import Scan
 from replay.sources.sqlite3_file import Sqlite3File
 from replay.sources.topics import topic_table
 from replay.sources.zstd import MAGIC as ZSTD_MAGIC
@@ -34,19 +35,18 @@ def _foreign() -> tuple[type[Exception], ...]:
 
 
 class Rosbag2Folder(Closing):
-    """A ROS 2 bag folder. Its parts are merged by time; each is opened for reading when its time has come.
+    """A ROS 2 bag folder. Its parts are merged by time.
 
-    Parts compressed as files are decompressed into a temporary directory, which `close` removes. What is compressed
-    is told by the files themselves, not by the metadata.
+    A part is open, and decompressed into a temporary directory if it was compressed as a file, only while its contents
+    are listed and while its messages are due: a bag may have more parts than files may be open, and be larger
+    decompressed than the disk. What is compressed is told by the files themselves, not by the metadata.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        with ExitStack() as stack, translated(path, _foreign()):
+        with translated(path, _foreign()):
             listed = _listed_parts(path) if (path / METADATA).exists() else []
-            paths = listed or _parts_in(path)
-            self._parts = [_opened_part(part, stack) for part in paths]
-            self._resources = stack.pop_all()
+            self._parts = [_FilePart(part) for part in listed or _parts_in(path)]
 
     @classmethod
     def recognises(cls, path: Path, head: bytes) -> bool:
@@ -67,33 +67,108 @@ class Rosbag2Folder(Closing):
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """Yield the messages of these topics in order of log time, ties in the order of the parts."""
-        return merged_by_time(self._parts, topics)
+        return merged_by_time([part for part in self._parts if part.holds(topics)], topics)
 
     def close(self) -> None:
         """Close the parts and remove temporary copies."""
-        self._resources.close()
+        for part in self._parts:
+            part.close()
 
 
-def merged_by_time(parts: Sequence[Source], topics: Collection[str]) -> Iterator[RawMessage]:
-    """Yield the messages of several recordings in order of log time, ties in the order of the recordings.
+class Part(Protocol):
+    """What `merged_by_time` takes."""
 
-    Unlike `heapq.merge` this begins to read a recording only when its first message is due, so that of a recording
-    in a hundred parts, one after the other, only one is held in memory.
+    @property
+    def info(self) -> SourceInfo:
+        """What the part holds."""
+
+    def messages(self, topics: Collection[str]) -> Generator[RawMessage, None, None]:
+        """Yield the messages of these topics in order of log time; to close this releases what is open for it."""
+
+
+def merged_by_time(parts: Sequence[Part], topics: Collection[str]) -> Iterator[RawMessage]:
+    """Yield the messages of several parts in order of log time, ties in the order of the parts.
+
+    Unlike `heapq.merge` this begins to read a part only when its first message is due, so that of a recording
+    in a hundred parts, one after the other, only one is open and in memory.
     """
-    streams = [part.messages(topics) for part in parts]
-    due: list[tuple[int, int, RawMessage | None]] = [
-        (part.info.start_ns, index, None) for index, part in enumerate(parts) if part.info.start_ns is not None
-    ]
-    heapq.heapify(due)
-    while due:
-        _, index, message = due[0]
-        if message is not None:
-            yield message
-        following = next(streams[index], None)
-        if following is None:
-            heapq.heappop(due)
-        else:
-            heapq.heapreplace(due, (following.log_time_ns, index, following))
+    with ExitStack() as stack:
+        streams = [stack.enter_context(closing(part.messages(topics))) for part in parts]
+        due: list[tuple[int, int, RawMessage | None]] = [
+            (part.info.start_ns, index, None) for index, part in enumerate(parts) if part.info.start_ns is not None
+        ]
+        heapq.heapify(due)
+        while due:
+            _, index, message = due[0]
+            if message is not None:
+                yield message
+            following = next(streams[index], None)
+            if following is None:
+                heapq.heappop(due)
+            else:
+                heapq.heapreplace(due, (following.log_time_ns, index, following))
+
+
+class _FilePart:
+    """One file of a bag, open only while it is read."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._map_scan: Scan | None = None
+        self._resources: set[ExitStack] = set()
+        self._is_closed = False
+        with self._opened() as source:
+            self.info = source.info
+
+    def holds(self, topics: Collection[str]) -> bool:
+        """Tell whether there are messages of any of these topics."""
+        return any(each.message_count and each.name in topics for each in self.info.topics)
+
+    def messages(self, topics: Collection[str]) -> Generator[RawMessage, None, None]:
+        """Yield the messages of these topics in order of log time."""
+        with self._opened() as source:
+            yield from source.messages(topics)
+
+    def close(self) -> None:
+        """Close the file and remove its copies, also those that are still being read."""
+        self._is_closed = True
+        for resources in tuple(self._resources):
+            resources.close()
+
+    @contextmanager
+    def _opened(self) -> Iterator[Source]:
+        """Open the file; what is opened is released at the end of the context, or by `close` if that comes first."""
+        if self._is_closed:
+            raise ValueError(f"{self._path} is read after it was closed")
+        with ExitStack() as stack:
+            with translated(self._path, _foreign()):
+                source = stack.enter_context(self._source(self._plain(stack)))
+            self._resources.add(stack)
+            stack.callback(self._resources.discard, stack)
+            try:
+                yield source
+            finally:
+                if isinstance(source, McapFile):
+                    self._map_scan = source.map_scan or self._map_scan
+
+    def _plain(self, stack: ExitStack) -> Path:
+        """Return the file, or a decompressed copy that is there as long as the stack."""
+        if not _head(self._path).startswith(ZSTD_MAGIC):
+            return self._path
+        folder = Path(stack.enter_context(TemporaryDirectory(prefix="replay-")))
+        plain = folder / self._path.name.removesuffix(".zstd")
+        decompress_file(self._path, plain)
+        return plain
+
+    def _source(self, plain: Path) -> Source:
+        head = _head(plain)
+        if McapFile.recognises(plain, head):
+            return McapFile(plain, self._path, self._map_scan)
+        if Sqlite3File.recognises(plain, head):
+            return Sqlite3File(plain, self._path)
+        raise InputError(
+            f"{self._path}: this part of a ROS 2 bag is neither MCAP nor SQLite; copy it again from where it was made"
+        )
 
 
 def _parts_in(path: Path) -> list[Path]:
@@ -149,24 +224,6 @@ def _metadata(path: Path) -> dict[str, Any]:
             "rebuild it with `ros2 bag reindex`, or remove it to read all bag files of the folder"
         )
     return metadata
-
-
-def _opened_part(path: Path, stack: ExitStack) -> Source:
-    """Return an open part; a compressed one is decompressed first."""
-    plain = path
-    if _head(path).startswith(ZSTD_MAGIC):
-        folder = Path(stack.enter_context(TemporaryDirectory(prefix="replay-")))
-        plain = folder / path.name.removesuffix(".zstd")
-        with translated(path, _foreign()):
-            decompress_file(path, plain)
-    head = _head(plain)
-    if McapFile.recognises(plain, head):
-        return stack.enter_context(McapFile(plain, copy_of=path))
-    if Sqlite3File.recognises(plain, head):
-        return stack.enter_context(Sqlite3File(plain, copy_of=path))
-    raise InputError(
-        f"{path}: this part of a ROS 2 bag is neither MCAP nor SQLite; copy it again from where it was made"
-    )
 
 
 def _head(path: Path) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -25,7 +26,9 @@ def test_the_table_has_a_row_a_robot(replay: Program, tmp_path: Path) -> None:
     head, *rows = (line.split() for line in ran.out.splitlines())
     assert head[:2] == ["robot", "status"]
     assert [row[:2] for row in rows] == [["r1", "reference"], ["r2", "merged"], ["r3", "unmerged"]]
-    assert rows[1][2:5] == ["11.20", "2.31", "126.1"]
+    pose = ran.robots["r2"]["merged_from_map"]
+    yaw_deg = math.degrees(pose["yaw_rad"])
+    assert rows[1][2:5] == [f"{pose['x_m']:.2f}", f"{pose['y_m']:.2f}", f"{yaw_deg:.1f}"]
     assert rows[2][2:5] == ["–", "–", "–"]
     for robot, line in zip(ran.robots.values(), ran.out.splitlines()[1:], strict=True):
         assert line.rstrip().endswith(robot["reason"]["message"])

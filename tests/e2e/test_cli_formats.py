@@ -108,8 +108,8 @@ class TestInputs:
             "format": "mcap",
             "size_bytes": two.stat().st_size,
             "robots": ["r1", "r2"],
-            "clocks": {"r1": "header", "r2": "header"},
-            "offsets_ns": {"r1": 0, "r2": 0},
+            "clocks": {"/r1/map": "header", "/r2/map": "header"},
+            "offsets_ns": {"/r1/map": 0, "/r2/map": 0},
             "messages": 6,
             "late": 0,
         }
@@ -142,7 +142,7 @@ class TestSavedMaps:
         assert ran.statuses == {"r1": "reference", "old": "merged"}
         assert is_right(ran.robots["old"]["merged_from_map"], reference_from("r2"))
         saved = ran.report["inputs"][1]
-        assert (saved["format"], saved["clocks"], saved["messages"]) == ("map_server", {"old": "none"}, 1)
+        assert (saved["format"], saved["clocks"], saved["messages"]) == ("map_server", {"/map": "none"}, 1)
         assert raw(ran.mcap, "/tf")[0][0] == at(0.0)
 
     def test_as_the_reference(self, replay: Program, tmp_path: Path) -> None:
@@ -162,7 +162,7 @@ class TestSavedMaps:
         run = bags.write_mcap(tmp_path / "run.mcap", growing("r1", topic="/map"))
         ran = replay.merge(f"r1={self.save(tmp_path / 'map.yaml', 'r2')}", f"r1={run}")
         assert ran.robots["r1"]["updates"] == 3  # it gives way to the first map of the same time
-        assert ran.report["inputs"][0]["clocks"] == {"r1": "none"}
+        assert ran.report["inputs"][0]["clocks"] == {"/map": "none"}
         assert raw(ran.mcap, "/tf")[0][0] == at(0.0)
 
 

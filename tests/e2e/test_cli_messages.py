@@ -78,15 +78,15 @@ class TestUpdates:
         ran = replay.merge(run)
         assert ran.report["skipped"] == {"update_before_grid": 1, "update_outside_grid": 4}
         assert ran.robots["r1"]["updates"] == 2
-        assert "5 messages were skipped: 1 update_before_grid, 4 update_outside_grid" in ran.err
-        assert ran.err.count("skipped a message of /r1/map_updates") == 5
+        assert "5 messages skipped: 1 update_before_grid, 4 update_outside_grid" in ran.err
+        assert ran.err.count("skipped a message (run.mcap, /r1/map_updates") == 5
 
     @pytest.mark.parametrize(("seconds", "col"), [(0.0, 0), (2.0, 118)])
     def test_and_fatal_with_strict(self, replay: Program, tmp_path: Path, seconds: float, col: int) -> None:
         messages = in_log_order([seen("r1", 1.0)], [updated("r1", seconds, col, 0, self.PART)])
         ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages), "--strict", "--robots", "r1")
         assert ran.status == 2
-        assert "/r1/map_updates of r1" in ran.error
+        assert "run.mcap: /r1/map_updates at" in ran.error
         assert not ran.mcap.exists()
 
     def test_a_smaller_map_takes_no_update_of_the_larger(self, replay: Program, tmp_path: Path) -> None:
@@ -108,7 +108,7 @@ class TestBadMessages:
         assert ran.report["skipped"] == dict.fromkeys(sorted(self.CAUSES), 1)
         assert ran.statuses == {"r1": "reference", "r2": "merged"}
         assert ran.robots["r2"]["updates"] == 3
-        assert ran.err.count("skipped a message of /r2/map at") == len(self.CAUSES)
+        assert ran.err.count("skipped a message (run.mcap, /r2/map, ") == len(self.CAUSES)
 
     @pytest.mark.parametrize("cause", CAUSES)
     @pytest.mark.parametrize("write", [write_mcap, write_rosbag1])
@@ -116,7 +116,7 @@ class TestBadMessages:
         messages = in_log_order(growing("r1"), [bad_messages("r1", 11.0)[cause]])
         ran = replay.merge(write(tmp_path / "run.bag", messages), "--strict", "--robots", "r1")
         assert ran.status == 2
-        assert ran.error.startswith("/r1/map of r1 at 17000000")
+        assert ran.error.startswith("run.bag: /r1/map at 17000000")
         assert not list(tmp_path.glob("out*"))
 
     @pytest.mark.parametrize("resolution", [0.0, -0.05, float("nan"), float("inf")])
@@ -139,7 +139,8 @@ class TestBadMessages:
         ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages))
         assert ran.statuses == {"r1": "no_map", "r2": "no_map"}
         assert ran.report["stamp_ns"] is None
-        assert reports(ran.mcap) == []
+        ((time_ns, report),) = reports(ran.mcap)
+        assert (time_ns, report["robots"]["r1"]["status"]) == (0, "no_map")
 
     def test_a_topic_without_any_message(self, replay: Program, tmp_path: Path) -> None:
         """As in a recording of a robot whose SLAM never came up."""
@@ -312,7 +313,8 @@ class TestUnplaced:
         nothing = Grid(np.full((20, 30), -1, np.int8), 0.1)
         messages = [seen("r1", 0.0, nothing), seen("r2", 1.0)]
         ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages), images="all")
-        assert ran.statuses == {"r1": "reference", "r2": "unmerged"}
+        assert ran.statuses == {"r1": "no_map", "r2": "unmerged"}
+        assert ran.robots["r2"]["reason"]["code"] == "no_reference_map"
 
 
 def test_every_robot_may_be_the_reference(replay: Program, tmp_path: Path) -> None:

@@ -32,22 +32,22 @@ class TestClock:
         run = write_mcap(tmp_path / "run.mcap", in_log_order(lagging("r1", 1.0), lagging("r2", 2.5)))
         by_header = replay.merge(run)
         assert ticks_s(by_header) == [-2.5, -1.0, 7.5, 9.0, 17.5, 19.0]
-        assert by_header.report["inputs"][0]["clocks"] == {"r1": "header", "r2": "header"}
+        assert by_header.report["inputs"][0]["clocks"] == {"/r1/map": "header", "/r2/map": "header"}
         by_log = replay.merge(run, "--clock", "log")
         assert ticks_s(by_log) == [0.0, 10.0, 20.0]
-        assert by_log.report["inputs"][0]["clocks"] == {"r1": "log", "r2": "log"}
+        assert by_log.report["inputs"][0]["clocks"] == {"/r1/map": "log", "/r2/map": "log"}
 
     def test_the_log_s_where_headers_have_none(self, replay: Program, tmp_path: Path) -> None:
         messages = in_log_order(growing("r1", stamp_ns=0), lagging("r2", 2.5))
         ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages))
-        assert ran.report["inputs"][0]["clocks"] == {"r1": "log", "r2": "header"}
+        assert ran.report["inputs"][0]["clocks"] == {"/r1/map": "log", "/r2/map": "header"}
         assert ticks_s(ran) == [-2.5, 0.0, 7.5, 10.0, 17.5, 20.0]
 
     def test_it_is_chosen_by_the_first_message(self, replay: Program, tmp_path: Path) -> None:
         first, *rest = lagging("r1", 1.0)
         messages = in_log_order([seen("r1", 0.0, flat_map("r1", 4.5), stamp_ns=0), *rest], growing("r2", 2.0))
         ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages))
-        assert ran.report["inputs"][0]["clocks"]["r1"] == "log"
+        assert ran.report["inputs"][0]["clocks"]["/r1/map"] == "log"
         assert first.log_time_ns == at(ticks_s(ran)[0])
 
     def test_nanoseconds_are_kept(self, replay: Program, tmp_path: Path) -> None:
@@ -64,9 +64,8 @@ class TestClock:
         one, two, three = growing("r1")
         odd = Recorded(two.topic, two.msgtype, two.log_time_ns, {**two.fields, "stamp_ns": stamp_ns})
         ran = replay.merge(write_mcap(tmp_path / "run.mcap", [one, odd, three]))
-        assert ticks_s(ran) == [0.0, 20.0]
-        assert maps(ran.mcap)[0].grid.cropped_to_known().cols == 71
-        assert ran.report["inputs"][0]["late"] == 1
+        assert ticks_s(ran) == [0.0, 10.0, 20.0]
+        assert ran.report["inputs"][0]["late"] == 0
 
 
 class TestOrder:
@@ -97,7 +96,7 @@ class TestOrder:
         assert ticks_s(ran) == [6.0, 10.0, 20.0]
         assert [each.grid.cropped_to_known().cols for each in maps(ran.mcap)] == [61, 81, 71]
         assert ran.report["inputs"][0]["late"] == 1
-        assert "1 messages came too late" in ran.err
+        assert "1 message too late" in ran.err
 
     def test_no_window(self, replay: Program, tmp_path: Path) -> None:
         run = write_mcap(tmp_path / "run.mcap", self.swapped(6.0))
@@ -121,17 +120,16 @@ class TestStartAndStop:
         [
             ((), [0.0, 2.0, 10.0, 12.0, 20.0, 22.0]),
             (("--start", "2"), [2.0, 10.0, 12.0, 20.0, 22.0]),
-            (("--start", "2.000000001"), [10.0, 12.0, 20.0, 22.0]),
+            (("--start", "2.000000001"), [2.000000001, 10.0, 12.0, 20.0, 22.0]),
             (("--stop", "12"), [0.0, 2.0, 10.0]),
             (("--start", "2.", "--stop", "12.5"), [2.0, 10.0, 12.0]),
             (("--start", f"{at(10.0)}ns", "--stop", f"{at(20.0)}ns"), [10.0, 12.0]),
-            (("--start", f"{at(10.0) + 1}ns"), [12.0, 20.0, 22.0]),
+            (("--start", f"{at(10.0) + 1}ns"), [10.000000001, 12.0, 20.0, 22.0]),
         ],
     )
     def test_forms(self, replay: Program, two: Path, arguments: tuple[str, ...], expected: list[float]) -> None:
         ran = replay.merge(two, *arguments)
         assert ticks_s(ran) == expected
-        assert ran.report["inputs"][0]["messages"] == len(expected)
 
     def test_iso_8601(self, replay: Program, two: Path) -> None:
         moment = datetime.fromtimestamp(at(10.0) // SECOND, UTC)
@@ -146,10 +144,9 @@ class TestStartAndStop:
 
     def test_a_window_without_maps(self, replay: Program, two: Path) -> None:
         ran = replay.merge(two, "--start", "1000")
-        assert ran.status == 0
-        assert ran.statuses == {"r1": "no_map", "r2": "no_map"}
-        assert ran.report["stamp_ns"] is None
-        assert not raw(ran.mcap, "/merged/map")
+        assert ran.status == 2
+        assert "--start is after all maps, which end 22.0 s after the first one" in ran.error
+        assert not ran.mcap.exists()
 
     def test_what_is_beyond_it_is_not_judged(self, replay: Program, tmp_path: Path) -> None:
         """A message that cannot be read has a log time at least."""
@@ -190,7 +187,7 @@ class TestOtherClocks:
         assert ticks_s(ran) == [1.0, 11.0, 21.0]
         assert {time_ns for time_ns, _ in transforms(ran.mcap)} == {at(1.0), at(11.0), at(21.0)}
         offsets = [item["offsets_ns"] for item in ran.report["inputs"]]
-        assert offsets == [{"a": 0}, {"b": at(1.0) - 3 * SECOND}]
+        assert offsets == [{"/map": 0}, {"/map": at(1.0) - 3 * SECOND}]
         assert ran.report["settings"]["align_starts"] is True
 
     def test_simulated_time_of_the_reference(self, replay: Program, bags: tuple[str, str]) -> None:
@@ -200,7 +197,7 @@ class TestOtherClocks:
 
     def test_start_and_stop_are_on_the_reference_s_clock(self, replay: Program, bags: tuple[str, str]) -> None:
         ran = replay.merge(*bags, "--align-starts", "--start", f"{at(5.0)}ns", "--stop", "15")
-        assert ticks_s(ran) == [11.0]
+        assert ticks_s(ran) == [5.0, 11.0]  # it begins with what was known then
 
     def test_robots_of_one_recording_stay_together(self, replay: Program, tmp_path: Path) -> None:
         a = write_mcap(tmp_path / "a.mcap", growing("r1", topic="/map"))

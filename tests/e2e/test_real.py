@@ -7,22 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.real import RECORDINGS
 from tests.data_paths import shared_data
 from tests.outputs import maps, raw
 from tests.program import Program
 from tests.truth import check, read_truth
-
-RECORDINGS = (
-    "intel_two.mcap",
-    "intel_res.mcap",
-    "intel_noise.mcap",
-    "intel_three.bag",
-    "fr101_two",
-    "fr101_half.mcap",
-    "fhw_two.mcap",
-    "other_place.mcap",
-    "odd_one_out.mcap",
-)
 
 
 @pytest.mark.parametrize("name", RECORDINGS)

@@ -93,6 +93,7 @@ def test_what_is_free_in_both_maps_is_lighter_and_in_its_place():
 def test_the_chosen_shift_is_marked_where_it_is():
     picture = render(surface(np.zeros((100, 100)), chosen=(20, 70)))
     rows, cols = np.nonzero((picture.rgb == (214, 39, 40)).all(axis=2))
-    zoom = picture.rgb.shape[0] / 100
+    zoom = picture.rgb.shape[1] / 100
+    title_rows = picture.rgb.shape[0] - picture.rgb.shape[1]
     assert cols.mean() == pytest.approx(70.5 * zoom, abs=2)
-    assert rows.mean() == pytest.approx((99.5 - 20) * zoom, abs=2)
+    assert rows.mean() == pytest.approx(title_rows + (99.5 - 20) * zoom, abs=2)

@@ -13,7 +13,7 @@ from mapmerge.match.correlation import judge
 from mapmerge.reasons import ReasonCode
 from mapmerge.sim2 import IDENTITY, Sim2
 from mapmerge.verify import Scores, cell_agreement, rank_score_m, verify, wall_agreement
-from tests.floors import CONFIG, drawn, filled, flat, prepared_map, within
+from tests.floors import drawn, filled, flat, prepared_map, within
 
 LIMITS = VerifyConfig()
 GOOD = Scores(
@@ -28,7 +28,7 @@ GOOD = Scores(
 
 
 def figures(target, source, pose=IDENTITY):
-    return verify(target, source, pose, CONFIG.search.wall_spacing_m, LIMITS)
+    return verify(target, source, pose, LIMITS)
 
 
 class TestCells:
@@ -120,11 +120,10 @@ class TestWalls:
 
     def test_the_truth_ranks_highest(self):
         target, source = prepared_map(flat()), prepared_map(flat(ragged=1))
-        spacing_m = CONFIG.search.wall_spacing_m
-        best = rank_score_m(target, source, IDENTITY, spacing_m, LIMITS)
+        best = rank_score_m(target, source, IDENTITY, LIMITS)
         assert best == figures(target, source).score_m
         for pose in (Sim2(0.5), Sim2(0.0, -0.6), Sim2(0.0, 0.0, 0.15), Sim2(*target.extent_m, math.pi)):
-            assert rank_score_m(target, source, pose, spacing_m, LIMITS) < 0.8 * best
+            assert rank_score_m(target, source, pose, LIMITS) < 0.8 * best
 
 
 class TestJudge:

@@ -2,10 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from replay.clocks import Probe, clock_of, frames, offsets_ns, probe
+from replay.clocks import Probe, agreed, frames, offsets_ns, probe
 from replay.errors import UsageError
 from replay.events import Clock
-from replay.selection import Selected
 from tests.bags import SECOND, START, Recorded
 from tests.fakes import FakeSource
 from tests.runs import at, bad_messages, seen
@@ -15,18 +14,31 @@ DAY_S = 86_400
 
 def probed(messages: list[Recorded], **options) -> Probe | None:
     choice = options.pop("choice", "header")
-    return probe(FakeSource(messages, **options), 3, Selected("r1", "/r1/map", (3,)), choice)
+    return probe(FakeSource(messages, **options), 3, "r1", "/r1/map", choice)
 
 
-def known(robot: str, first_s: float, last_s: float | None = None, index: int = 0, clock: Clock = "header") -> Probe:
-    last_s = first_s + 10.0 if last_s is None else last_s
-    return Probe(robot, index, clock, round(first_s * SECOND), round(last_s * SECOND), "map")
+def known(
+    robot: str,
+    first_s: float,
+    last_s: float | None = None,
+    *,
+    index: int = 0,
+    clock: Clock = "header",
+    topic: str | None = None,
+) -> Probe:
+    first_ns = round(first_s * SECOND)
+    last_ns = round((first_s + 10.0 if last_s is None else last_s) * SECOND)
+    log_ns = (first_ns + SECOND, last_ns + SECOND)
+    return Probe(robot, index, topic or f"/{robot}/map", clock, first_ns, last_ns, *log_ns, "map")
+
+
+SAVED = Probe("old", 1, "/map", "none", None, None, 0, 0, "map")
 
 
 class TestProbe:
     def test_header(self) -> None:
         found = probed([seen("r1", 5.0, stamp_ns=7 * SECOND, frame="/odom"), seen("r1", 25.0)])
-        assert found == Probe("r1", 3, "header", 7 * SECOND, 27 * SECOND, "/odom")
+        assert found == Probe("r1", 3, "/r1/map", "header", 7 * SECOND, 27 * SECOND, at(5.0), at(25.0), "/odom")
 
     @pytest.mark.parametrize("stamp_ns", [0, -SECOND])
     def test_log_where_the_header_has_no_time(self, stamp_ns: int) -> None:
@@ -40,7 +52,9 @@ class TestProbe:
         assert (found.clock, found.first_ns) == ("log", at(5.0))
 
     def test_no_clock(self) -> None:
-        assert probed([seen("r1", 0.0)], has_clock=False) == Probe("r1", 3, "none", None, None, "map")
+        assert probed([seen("r1", 0.0)], has_clock=False) == Probe(
+            "r1", 3, "/r1/map", "none", None, None, at(0.0), at(0.0), "map"
+        )
 
     def test_the_first_message_that_can_be_used(self) -> None:
         found = probed([*bad_messages("r1", 0.0).values(), seen("r1", 30.0)])
@@ -51,19 +65,23 @@ class TestProbe:
         assert probed(list(bad_messages("r1", 0.0).values())) is None
 
 
-@pytest.mark.parametrize(
-    ("clocks", "expected"),
-    [
-        ((), "header"),
-        (("none",), "none"),
-        (("header", "none"), "header"),
-        (("header", "header"), "header"),
-        (("header", "log"), "log"),
-        (("log", "none"), "log"),
-    ],
-)
-def test_clock_of_one_robot(clocks: tuple[Clock, ...], expected: Clock) -> None:
-    assert clock_of([known("r1", 0.0, clock=clock) for clock in clocks]) == expected
+class TestAgreed:
+    def test_the_header_only_where_all_inputs_have_it(self) -> None:
+        probes = [known("r1", 5.0), known("r1", 6.0, index=1, clock="log"), known("r2", 7.0)]
+        assert [item.clock for item in agreed(probes)] == ["log", "log", "header"]
+        assert agreed(probes)[0].first_ns == probes[0].first_log_ns
+
+    def test_each_topic_has_its_own(self) -> None:
+        probes = [known("r1", 5.0), known("r1", 6.0, clock="log", topic="/r1/map_updates")]
+        assert [item.clock for item in agreed(probes)] == ["header", "log"]
+
+    def test_saved_maps_have_none_and_do_not_matter(self) -> None:
+        probes = [
+            SAVED,
+            known("old", 5.0, index=2, topic="/map"),
+            known("old", 6.0, index=3, clock="log", topic="/map"),
+        ]
+        assert [item.clock for item in agreed(probes)] == ["none", "log", "log"]
 
 
 @pytest.mark.parametrize(
@@ -89,7 +107,7 @@ def test_frame_of_a_robot_without_a_map() -> None:
 class TestOffsets:
     def test_none_where_clocks_may_be_the_same(self) -> None:
         probes = [known("r1", START / SECOND), known("r2", START / SECOND + DAY_S - 1.0, index=1)]
-        assert offsets_ns("r1", probes, align_starts=False) == {(0, "r1"): 0, (1, "r2"): 0}
+        assert offsets_ns("r1", probes, align_starts=False) == {(0, "/r1/map"): 0, (1, "/r2/map"): 0}
 
     @pytest.mark.parametrize("gap_s", [DAY_S + 1.0, -DAY_S - 1.0, 1.7e9])
     def test_refused_where_they_cannot(self, gap_s: float) -> None:
@@ -107,18 +125,22 @@ class TestOffsets:
     def test_aligned(self) -> None:
         probes = [known("r1", 1e9), known("r2", 5.0, index=1), known("r3", 7.0, index=1), known("r4", 2e9, index=2)]
         assert offsets_ns("r1", probes, align_starts=True) == {
-            (0, "r1"): 0,
-            (1, "r2"): (10**9 - 5) * SECOND,
-            (1, "r3"): (10**9 - 5) * SECOND,
-            (2, "r4"): -(10**9) * SECOND,
+            (0, "/r1/map"): 0,
+            (1, "/r2/map"): (10**9 - 5) * SECOND,
+            (1, "/r3/map"): (10**9 - 5) * SECOND,
+            (2, "/r4/map"): -(10**9) * SECOND,
         }
 
     def test_saved_maps_have_none(self) -> None:
-        saved = Probe("old", 1, "none", None, None, "map")
-        assert offsets_ns("r1", [known("r1", 1e9), saved], align_starts=False) == {(0, "r1"): 0}
+        saved = SAVED
+        assert offsets_ns("r1", [known("r1", 1e9), saved], align_starts=False) == {(0, "/r1/map"): 0}
         assert offsets_ns("old", [saved], align_starts=True) == {}
 
     def test_a_reference_without_a_time_follows_the_first_that_has(self) -> None:
-        saved = Probe("old", 2, "none", None, None, "map")
-        probes = [saved, known("r1", 1e9), known("r2", 5.0, index=1)]
-        assert offsets_ns("old", probes, align_starts=True)[1, "r2"] == (10**9 - 5) * SECOND
+        probes = [SAVED, known("r1", 1e9), known("r2", 5.0, index=1)]
+        assert offsets_ns("old", probes, align_starts=True)[1, "/r2/map"] == (10**9 - 5) * SECOND
+
+    def test_parts_of_one_recording_keep_their_distance(self) -> None:
+        probes = [known("a", 1e9), known("b", 5.0, index=1), known("b", 105.0, index=2)]
+        shifts = offsets_ns("a", probes, align_starts=True)
+        assert shifts[1, "/b/map"] == shifts[2, "/b/map"] == (10**9 - 5) * SECOND

@@ -62,7 +62,7 @@ def test_one_clock_a_robot(tmp_path: Path) -> None:
     b = write_mcap(tmp_path / "b.mcap", growing("r1", 60.0, stamp_ns=0))
     plan = planned(a, b)
     assert plan.robots[0].clock == "log"
-    assert [dict(feed.clocks) for feed in plan.feeds] == [{"r1": "log"}] * 2
+    assert [dict(feed.clocks) for feed in plan.feeds] == [{"/r1/map": "log"}] * 2
 
 
 def test_window(two: Path) -> None:

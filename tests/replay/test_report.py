@@ -121,7 +121,7 @@ def test_a_pair_without_a_candidate() -> None:
 def test_skipped_messages_are_counted_by_cause() -> None:
     report = builder()
     for cause in (SkipCause.EMPTY, SkipCause.BAD_ORIGIN, SkipCause.EMPTY):
-        report.skip(Skipped("r1", "/r1/map", 5, cause, "detail"))
+        report.skip(Skipped("r1", "/r1/map", 5, cause, "detail", "run.mcap"))
     found = report.build(None, MergeState.initial(ROBOTS).result, [INPUT])
     validate(found)
     assert list(found["skipped"].items()) == [("bad_origin", 1), ("empty", 2)]

@@ -77,7 +77,7 @@ def story() -> list[Event]:
         STAMPS[4]: {"r2": bare_room()},
         STAMPS[5]: {"r2": flat_map("r2")},
     }
-    cause = Skipped("r4", "/r4/map", 12, SkipCause.EMPTY, "it has 0 × 0 cells")
+    cause = Skipped("r4", "/r4/map", 12, SkipCause.EMPTY, "it has 0 × 0 cells", "run.mcap")
     return events_of(ROBOTS, ticks, {STAMPS[2]: cause})
 
 
@@ -234,7 +234,7 @@ def test_decisions_say_what_happened_and_why(recording: Path) -> None:
         (STAMPS[5], "INFO", "r2 placed on r1: "),
         (STAMPS[5], "WARN", "end: 2 of 4 robots are in the merged map"),
         (STAMPS[5], "WARN", f"{STRANGER} is not merged: not placed on "),
-        (STAMPS[5], "WARN", "r4 is not merged: no map yet"),
+        (STAMPS[5], "WARN", "r4 is not merged: no map that shows anything yet"),
     ]
     for (stamp_ns, level, words), (expected_ns, expected_level, begin) in zip(said, expected, strict=True):
         assert (stamp_ns, level) == (expected_ns, expected_level)
@@ -296,11 +296,11 @@ def contents(path: Path) -> list[tuple[str, str]]:
 
 
 def test_a_run_without_any_map_is_still_a_recording(tmp_path: Path) -> None:
-    skipped = Skipped("r1", "/r1/map", 12, SkipCause.EMPTY, "it has 0 × 0 cells")
+    skipped = Skipped("r1", "/r1/map", 12, SkipCause.EMPTY, "it has 0 × 0 cells", "run.mcap")
     started, finished = events_of(["r1"], {})
     path = written(tmp_path / "none.rrd", [started, skipped, finished])
     texts = Entity(path, "/decisions").values("TextLog:text")
-    assert "r1 is not merged: no map yet" in texts
+    assert "r1 is not merged: no map that shows anything yet" in texts
 
 
 def test_maps_that_know_nothing_or_have_no_walls_are_no_trouble(tmp_path: Path) -> None:

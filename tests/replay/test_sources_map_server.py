@@ -115,21 +115,35 @@ def test_yaml_that_is_no_map(tmp_path: Path, text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("keys", "word"),
+    ("key", "values", "expected"),
     [
-        ({"origin": [1, 2]}, "'origin'"),
-        ({"origin": [1, 2, "x"]}, "'origin'"),
-        ({"origin": [1, 2, ".nan"]}, "origin"),
-        ({"resolution": "fine"}, "'resolution'"),
-        ({"resolution": 0}, "resolution"),
-        ({"mode": "best"}, "'mode'"),
-        ({"negate": "perhaps"}, "'negate'"),
-        ({"negate": 0.5}, "'negate'"),
-        ({"origin": "[1, 2"}, "cannot be read"),
+        ("resolution", ["fine", '"a\\nb"', "[0.05]", "true", "2001-01-01"], "a positive number of metres per pixel"),
+        ("resolution", [0, 0.0, -0.05, ".nan", ".inf", "-.inf", 1e39, 1e-60], "a positive number of metres per pixel"),
+        ("origin", [5, "[]", [1, 2], [1, 2, 3, 4], "[1, 2, x]", "[1, 2, .nan]", "[-.inf, 0, 0]"], "three numbers in m"),
+        ("origin", ["{x: 1, y: 2, yaw: 3}", "[1, 2, [3]]", f"[1, 2, {10**400}]"], "[x, y, yaw]"),
+        ("occupied_thresh", ["much", 65, -0.1, ".nan", "[0.65]"], "a number from 0 to 1"),
+        ("free_thresh", ["little", 1.1, -1, ".nan", "{}"], "a number from 0 to 1"),
+        ("mode", ["best", 1, "[raw]"], "one of trinary, scale, raw"),
+        ("negate", ["perhaps", 0.5], "0 or 1"),
     ],
 )
-def test_what_the_yaml_may_not_say(tmp_path: Path, keys: dict[str, Any], word: str) -> None:
-    refused(write_saved_map(tmp_path / "map.yaml", GRAY, **keys), word)
+def test_a_value_that_is_wrong_is_named_with_what_is_expected(
+    tmp_path: Path, key: str, values: list[object], expected: str
+) -> None:
+    for value in values:
+        path = write_saved_map(tmp_path / "map.yaml", GRAY, **{key: value})
+        text = refused(path, f"'{key}' is ", f"correct '{key}' in this file")
+        assert text.startswith(f"{path}: ")
+        assert expected in text
+        assert "copy it again" not in text
+
+
+def test_yaml_that_cannot_be_read(tmp_path: Path) -> None:
+    refused(write_saved_map(tmp_path / "map.yaml", GRAY, origin="[1, 2"), "cannot be read")
+
+
+def test_thresholds_at_their_ends(tmp_path: Path) -> None:
+    assert _grid(write_saved_map(tmp_path / "map.yaml", GRAY, occupied_thresh=1, free_thresh=0)).cols == 4
 
 
 def test_missing_image(tmp_path: Path) -> None:

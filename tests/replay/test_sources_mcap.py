@@ -12,7 +12,7 @@ from mcap.records import Channel, Message, Schema
 from mcap.writer import IndexType, Writer
 
 from replay.errors import InputError
-from replay.sources import mcap_index, open_source
+from replay.sources import mcap_file, mcap_index, open_source
 from replay.sources.chunks import HELD_CHUNKS, ChunkCache
 from replay.sources.mcap_records import MAGIC
 from tests import bags
@@ -75,6 +75,22 @@ def test_a_channel_that_is_indexed_in_part_is_passed_through(tmp_path: Path) -> 
 
     assert _times(path, "/r1/map") == sorted([*_expected("/r1/map"), START + 7])
     assert _times(path, "/r2/map") == _expected("/r2/map")
+
+
+@pytest.mark.parametrize("options", [NO_SUMMARY, NO_INDEX, {"index_types": IndexType.CHUNK}])
+def test_without_an_index_the_maps_are_looked_for_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: dict[str, Any]
+) -> None:
+    scans: list[Path] = []
+    original = mcap_file.scan
+    monkeypatch.setattr(mcap_file, "scan", lambda file, wanted: (scans.append(file.path), original(file, wanted))[1])
+    path = bags.write_mcap(tmp_path / "a.mcap", **options)
+    with open_source(path) as source:
+        for topics in ({"/r1/map"}, {"/r2/map", "/r1/map_updates"}, {"/r1/map"}, TOPICS):
+            assert [each.log_time_ns for each in source.messages(topics)] == _expected(*topics)
+        assert scans == [path]
+        assert [each.log_time_ns for each in source.messages(["/chatter"])] == _expected("/chatter")
+        assert len(scans) == 2
 
 
 def test_a_damaged_summary_is_not_believed(tmp_path: Path) -> None:

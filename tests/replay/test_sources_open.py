@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import gzip
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -147,6 +149,20 @@ def test_errors_of_libraries_become_one_line(make: Callable[[], Exception]) -> N
     assert "some/recording" in str(caught.value)
     assert "\n" not in str(caught.value)
     assert caught.value.__cause__ is error
+
+
+@pytest.mark.parametrize(
+    ("number", "remedy"),
+    [(errno.EMFILE, "`ulimit -n`"), (errno.ENFILE, "raise the limit"), (errno.ENOSPC, "TMPDIR")],
+)
+def test_limits_of_the_machine_are_not_blamed_on_the_recording(number: int, remedy: str) -> None:
+    with pytest.raises(InputError) as caught, translated(Path("some/recording")):
+        raise OSError(number, os.strerror(number), "another/file")
+    text = str(caught.value)
+    assert text.startswith(f"some/recording: it cannot be read: {os.strerror(number)}; ")
+    assert remedy in text
+    assert "expected a recording" not in text
+    assert "copy it again" not in text
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), SystemExit(2), GeneratorExit(), apsw.Error("not ours")])

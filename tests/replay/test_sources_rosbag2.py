@@ -1,18 +1,22 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 import tempfile
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Generator
 from pathlib import Path
+from typing import Any, Literal
 
 import pytest
 
-from replay.sources import open_source
+from replay.errors import InputError
+from replay.sources import mcap_file, open_source
 from replay.sources.base import RawMessage, SourceInfo
-from replay.sources.boundary import Closing
 from replay.sources.rosbag2_folder import merged_by_time
 from replay.sources.zstd import MAGIC, zstd
 from tests import bags
-from tests.bags import START
+from tests.bags import SECOND, START
+from tests.data_paths import ROOT
 from tests.replay.test_sources_open import refused
 
 TOPICS = {each.topic for each in bags.SAMPLE}
@@ -39,7 +43,6 @@ def test_a_part_that_is_not_compressed_yet(tmp_path: Path, temporary: Path) -> N
     (plain / "plain_14.db3").rename(path / "bag_14.db3")
     with open_source(path) as source:
         assert len(list(source.messages(TOPICS))) == len(bags.SAMPLE)
-        assert len(list(temporary.iterdir())) == len(bags.SAMPLE) - 1
     assert list(temporary.iterdir()) == []
 
 
@@ -113,10 +116,132 @@ def test_the_metadata_itself_points_to_its_folder(tmp_path: Path) -> None:
     refused(path / "metadata.yaml", "give its folder", str(path))
 
 
+# --- what is open at a time
+
+
+def _bag(path: Path, *parts: Path) -> Path:
+    """Make a bag without metadata of single files, in this order."""
+    path.mkdir()
+    for index, part in enumerate(parts):
+        part.rename(path / f"part_{index}{''.join(part.suffixes)}")
+    return path
+
+
+def _part(path: Path, *seconds: int, **options: Any) -> Path:
+    messages = [bags.recorded_map("/r1/map", START + each * SECOND, seed=1, rows=1) for each in seconds]
+    return bags.write_mcap(path, messages, **options)
+
+
+def _compressed_part(path: Path, *seconds: int) -> Path:
+    part = _part(path, *seconds)
+    compressed = path.with_name(f"{path.name}.zstd")
+    compressed.write_bytes(zstd.compress(part.read_bytes()))
+    return compressed
+
+
+READ_WITH_FEW_HANDLES = """
+import resource, sys
+from pathlib import Path
+from replay.sources import open_source
+
+resource.setrlimit(resource.RLIMIT_NOFILE, (40, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+with open_source(Path(sys.argv[1])) as source:
+    times = [each.log_time_ns for each in source.messages(["/r1/map"])]
+print(len(times), times == sorted(times))
+"""
+
+
+@pytest.mark.parametrize(("storage", "compression"), [("sqlite3", "none"), ("mcap", "file")])
+def test_more_parts_than_files_may_be_open(
+    tmp_path: Path, storage: Literal["sqlite3", "mcap"], compression: Literal["none", "file"]
+) -> None:
+    pytest.importorskip("resource", reason="Windows has no such limit")
+    messages = [bags.recorded_map("/r1/map", START + each, seed=1, rows=1) for each in range(300)]
+    path = bags.write_split_rosbag2(tmp_path / "bag", messages, storage, compression)
+    command = [sys.executable, "-c", READ_WITH_FEW_HANDLES, str(path)]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert (run.stdout.strip(), run.stderr) == ("300 True", "")
+
+
+def test_copies_of_compressed_parts_are_there_only_while_they_are_read(tmp_path: Path, temporary: Path) -> None:
+    seconds = ((0, 1), (2, 5), (4, 6), (7, 8))
+    parts = [_compressed_part(tmp_path / f"{index}.mcap", *each) for index, each in enumerate(seconds)]
+    counts = []
+    with open_source(_bag(tmp_path / "bag", *parts)) as source:
+        assert list(temporary.iterdir()) == []
+        for message in source.messages(["/r1/map"]):
+            copies = sorted(file.name for file in temporary.glob("*/*"))
+            counts.append(((message.log_time_ns - START) // SECOND, [name[5] for name in copies]))
+            assert len(list(temporary.iterdir())) == len(copies)
+        assert list(temporary.iterdir()) == []
+    assert counts == [
+        (0, ["0"]), (1, ["0"]), (2, ["1"]), (4, ["1", "2"]), (5, ["1", "2"]), (6, ["2"]), (7, ["3"]), (8, ["3"])
+    ]  # fmt: skip
+
+
+def test_no_copy_stays_when_reading_ends_early(tmp_path: Path, temporary: Path) -> None:
+    parts = [_compressed_part(tmp_path / f"{index}.mcap", 0, 9) for index in range(3)]
+    with open_source(_bag(tmp_path / "bag", *parts)) as source:
+        for _ in source.messages(["/r1/map"]):
+            break
+        assert list(temporary.iterdir()) == []
+
+
+def test_no_copy_stays_when_a_part_is_damaged(tmp_path: Path, temporary: Path) -> None:
+    parts = [_compressed_part(tmp_path / f"{index}.mcap", 0, 9) for index in range(3)]
+    path = _bag(tmp_path / "bag", *parts)
+    with open_source(path) as source:
+        part = path / "part_2.mcap.zstd"
+        part.write_bytes(part.read_bytes()[:-20])
+        with pytest.raises(InputError, match="ended before") as caught:
+            list(source.messages(["/r1/map"]))
+        assert str(caught.value).startswith(str(part))
+        assert list(temporary.iterdir()) == []
+
+
+def test_to_close_removes_the_copies_that_are_being_read(tmp_path: Path, temporary: Path) -> None:
+    parts = [_compressed_part(tmp_path / f"{index}.mcap", index, 9) for index in range(3)]
+    source = open_source(_bag(tmp_path / "bag", *parts))
+    messages = source.messages(["/r1/map"])
+    next(messages)
+    assert len(list(temporary.iterdir())) == 1
+    source.close()
+    assert list(temporary.iterdir()) == []
+    with pytest.raises(ValueError, match="closed"):
+        list(messages)
+    assert list(temporary.iterdir()) == []
+
+
+def test_parts_without_the_topics_are_not_opened_again(tmp_path: Path) -> None:
+    path = bags.write_split_rosbag2(tmp_path / "bag", bags.SAMPLE[:3])
+    with open_source(path) as source:
+        (path / "bag_5.db3").unlink()
+        assert [each.topic for each in source.messages(["/r1/map", "/r2/map"])] == ["/r1/map", "/r2/map"]
+        with pytest.raises(InputError, match=r"bag_5\.db3"):
+            list(source.messages(["/chatter"]))
+
+
+@pytest.mark.parametrize("options", [bags.NO_SUMMARY, bags.NO_INDEX])
+def test_parts_without_an_index_are_passed_through_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: dict[str, Any]
+) -> None:
+    passed: list[str] = []
+    original = mcap_file.scan
+    monkeypatch.setattr(
+        mcap_file, "scan", lambda file, wanted: (passed.append(file.path.name), original(file, wanted))[1]
+    )
+    parts = [_part(tmp_path / f"{index}.mcap", index, index + 3, **options) for index in range(2)]
+    with open_source(_bag(tmp_path / "bag", *parts)) as source:
+        next(source.messages(["/r1/map"]))
+        assert len(list(source.messages(["/r1/map"]))) == 4
+        assert len(list(source.messages(["/r1/map"]))) == 4
+    assert sorted(passed) == ["part_0.mcap", "part_1.mcap"]
+
+
 # --- merging
 
 
-class _Part(Closing):
+class _Part:
     """A recording of one topic; tells whether it has been read from."""
 
     def __init__(self, name: str, *seconds: int) -> None:
@@ -129,14 +254,11 @@ class _Part(Closing):
         times = [START + each for each in self.seconds]
         return SourceInfo("mcap", min(times, default=None), max(times, default=None), ())
 
-    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
+    def messages(self, topics: Collection[str]) -> Generator[RawMessage, None, None]:
         del topics
         self.is_read = True
         for each in self.seconds:
             yield RawMessage(str(self.path), "t", "cdr", START + each, b"")
-
-    def close(self) -> None:
-        pass
 
 
 def test_parts_are_merged_by_time_and_ties_keep_the_order_of_the_parts() -> None:

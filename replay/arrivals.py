@@ -1,0 +1,200 @@
+"""The messages of one recording, decoded, with their times, in order of time.
+
+A recording is read once, in order of log time. Its messages are put in order of their stamps within a window. Memory is
+that of the window.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import heapq
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+from mapmerge.grid import Grid
+from replay.assemble import assemble
+from replay.clocks import stamp_ns
+from replay.codec import decode
+from replay.errors import BadMessage
+from replay.events import Clock, SkipCause, Skipped
+from replay.messages import GridMessage, UpdateMessage
+from replay.sources.base import RawMessage, Source
+
+
+@dataclass(frozen=True, slots=True)
+class Feed:
+    """What is read from one recording.
+
+    Parameters
+    ----------
+    robot_of
+        Robot of each topic.
+    clocks
+        Clock of each topic.
+    offsets_ns
+        Added to each topic's times.
+    untimed_ns
+        Time given to saved maps, which have none.
+    """
+
+    source: Source
+    robot_of: Mapping[str, str]
+    clocks: Mapping[str, Clock]
+    offsets_ns: Mapping[str, int]
+    untimed_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Which times are used (``start_ns`` ≤ time < ``stop_ns``), and how far messages are put in order.
+
+    A robot's last map before ``start_ns`` is used as well: at ``start_ns``, it is what is known.
+    """
+
+    start_ns: int | None
+    stop_ns: int | None
+    reorder_ns: int
+
+
+@dataclass(slots=True)
+class Tally:
+    """What was read of one recording; grows while it is read."""
+
+    messages: int = 0
+    late: int = 0
+    digest: hashlib._Hash = field(default_factory=hashlib.sha256)
+
+    def count(self, raw: RawMessage) -> None:
+        """Take a message that is used into the count and the digest."""
+        self.messages += 1
+        self.digest.update(f"{raw.topic} {raw.log_time_ns} {len(raw.data)}\n".encode())
+        self.digest.update(raw.data)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arrival:
+    """A message, or why it cannot be used, at the time at which it takes effect."""
+
+    stamp_ns: int
+    robot: str
+    input: str
+    raw: RawMessage
+    content: GridMessage | UpdateMessage | Skipped
+
+    def skipped(self, error: BadMessage) -> Skipped:
+        """Return why the message is not used after all."""
+        return _skipped(self.robot, self.input, self.raw, error)
+
+
+def in_order(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
+    """Yield a recording's messages with stamps that never decrease.
+
+    A message is held back until one arrives whose stamp is later by the window; one that comes too late to be put in
+    its place takes effect on arrival.
+    """
+    held: list[tuple[int, int, Arrival]] = []
+    newest_ns = released_ns = None
+    for number, arrival in enumerate(_stamped(feed, tally, window)):
+        stamp = arrival.stamp_ns
+        if released_ns is not None and stamp < released_ns:
+            tally.late += 1
+            arrival = replace(arrival, stamp_ns=released_ns)  # noqa: PLW2901
+        newest_ns = stamp if newest_ns is None else max(newest_ns, stamp)
+        heapq.heappush(held, (arrival.stamp_ns, number, arrival))
+        while held and held[0][0] <= newest_ns - window.reorder_ns:
+            released_ns = held[0][0]
+            yield heapq.heappop(held)[2]
+    while held:
+        yield heapq.heappop(held)[2]
+
+
+def _stamped(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
+    """Decode a recording's messages and give each its time on the reference's clock."""
+    name = feed.source.path.name
+    times = _Times(feed, tally)
+    before = _Before()
+    for raw in feed.source.messages(tuple(feed.robot_of)):
+        robot = feed.robot_of[raw.topic]
+        content = _decoded(robot, name, raw)
+        time_ns = times.of(raw, content)
+        early = window.start_ns is not None and time_ns < window.start_ns
+        if early and not isinstance(content, Skipped):
+            tally.count(raw)
+            before.take(Arrival(time_ns, robot, name, raw, content))
+        if early or (window.stop_ns is not None and time_ns >= window.stop_ns):
+            continue
+        yield from before.release(window.start_ns)
+        tally.count(raw)
+        yield Arrival(time_ns, robot, name, raw, content)
+    yield from before.release(window.start_ns)
+
+
+def _decoded(robot: str, name: str, raw: RawMessage) -> GridMessage | UpdateMessage | Skipped:
+    try:
+        return decode(raw)
+    except BadMessage as error:
+        return _skipped(robot, name, raw, error)
+
+
+class _Times:
+    """Gives the messages of a recording their times.
+
+    Where a message does not say, because it cannot be decoded or its header has no time, it is its log time, shifted as
+    that of the message before it on its topic was; without one, the newest time so far.
+    """
+
+    def __init__(self, feed: Feed, tally: Tally) -> None:
+        self._feed = feed
+        self._tally = tally
+        self._leads_ns: dict[str, int] = {}
+        self._newest_ns = feed.untimed_ns
+
+    def of(self, raw: RawMessage, content: GridMessage | UpdateMessage | Skipped) -> int:
+        """Return the time of a message."""
+        clock = self._feed.clocks[raw.topic]
+        if clock == "none":
+            return self._feed.untimed_ns
+        if isinstance(content, Skipped) or (clock == "header" and content.stamp_ns <= 0):
+            time_ns = self._guessed(raw)
+        else:
+            time_ns = max(0, stamp_ns(clock, raw, content) + self._feed.offsets_ns[raw.topic])
+            self._leads_ns[raw.topic] = time_ns - raw.log_time_ns
+        self._newest_ns = max(self._newest_ns, time_ns)
+        return time_ns
+
+    def _guessed(self, raw: RawMessage) -> int:
+        if raw.topic in self._leads_ns:
+            return max(0, raw.log_time_ns + self._leads_ns[raw.topic])
+        self._tally.late += 1
+        return self._newest_ns
+
+
+class _Before:
+    """The last map of each robot before the times that are used."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, tuple[Arrival, Grid]] = {}
+
+    def take(self, arrival: Arrival) -> None:
+        """Keep a map, or an update of the one that is kept; what cannot be used is left out, as all of that time is."""
+        if isinstance(arrival.content, Skipped):
+            return
+        kept = self._last.get(arrival.robot)
+        older = kept is not None and arrival.stamp_ns < kept[0].stamp_ns
+        if older and isinstance(arrival.content, GridMessage):
+            return
+        try:
+            grid = assemble(kept[1] if kept else None, arrival.content)
+        except BadMessage:
+            return
+        self._last[arrival.robot] = arrival, grid
+
+    def release(self, start_ns: int | None) -> Iterator[Arrival]:
+        """Yield what was kept, once, as maps of the time ``start_ns``."""
+        for arrival, grid in self._last.values():
+            yield replace(arrival, stamp_ns=start_ns or 0, content=GridMessage(arrival.stamp_ns, "", grid))
+        self._last.clear()
+
+
+def _skipped(robot: str, name: str, raw: RawMessage, error: BadMessage) -> Skipped:
+    return Skipped(robot, raw.topic, raw.log_time_ns, SkipCause(error.cause), error.detail, name)
