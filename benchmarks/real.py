@@ -17,7 +17,7 @@ from mapmerge.sim2 import Sim2, wrap_angle
 from replay.events import Finished, Merged, Report
 from replay.options import RunOptions
 from replay.pipeline import merge
-from replay.selection import RunPath
+from replay.runs import RunPath
 
 MAX_ERROR_M = 0.20
 MAX_ERROR_DEG = 1.0

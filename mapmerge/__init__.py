@@ -7,7 +7,8 @@ from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError, GridError, MapMergeError
 from mapmerge.grid import Grid
 from mapmerge.match import Match
-from mapmerge.merger import MergeResult, MergeState, RobotOutcome, Status, step
+from mapmerge.merger import MergeResult, MergeState, step
+from mapmerge.outcome import RobotOutcome, Status
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
 

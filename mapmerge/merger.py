@@ -7,72 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from itertools import combinations
 from typing import Any
 
 from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError
-from mapmerge.fuse import Agreement, Fusion, Layer, fuse
-from mapmerge.graph import Edge, Forest, Placement, place
+from mapmerge.fuse import Layer, fuse
+from mapmerge.graph import Edge, Forest, place
 from mapmerge.grid import Grid
 from mapmerge.match import Match, load_matcher
+from mapmerge.outcome import Change, Pair, RobotOutcome, Status, changes_of, outcomes_of
 from mapmerge.reasons import Reason, ReasonCode
-from mapmerge.sim2 import IDENTITY, Sim2
-
-Pair = tuple[str, str]
-
-
-class Status(StrEnum):
-    """What became of a robot's map."""
-
-    REFERENCE = "reference"
-    MERGED = "merged"
-    UNMERGED = "unmerged"
-    NO_MAP = "no_map"
-
-
-class ChangeKind(StrEnum):
-    """How a robot's placement changed."""
-
-    PLACED = "placed"
-    MOVED = "moved"
-    WITHDRAWN = "withdrawn"
-
-
-@dataclass(frozen=True, slots=True)
-class Change:
-    """A robot's map was placed, moved or withdrawn."""
-
-    robot: str
-    kind: ChangeKind
-    reason: Reason
-
-
-@dataclass(frozen=True, slots=True)
-class RobotOutcome:
-    """What is known of one robot's map.
-
-    Parameters
-    ----------
-    status, reason
-        What became of it, and why.
-    merged_from_map
-        Where its map frame lies in the merged frame; None if it is not placed.
-    agreement
-        Of a placed map with all other placed maps; of one that is not placed, that of its best refused candidate.
-    placement
-        Its place in its component; None without a map.
-    shown_pair
-        The match that placed it or, if it is not placed, its best refused one.
-    """
-
-    status: Status
-    reason: Reason
-    merged_from_map: Sim2 | None = None
-    agreement: Agreement | None = None
-    placement: Placement | None = None
-    shown_pair: Pair | None = None
+from mapmerge.sim2 import Sim2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,8 +120,8 @@ def step(state: MergeState, updates: Mapping[str, Grid], config: MergeConfig) ->
     pairs = _without_contradicted(matches, forest)
     layers = _layers(robots[0], maps, forest)
     fusion = fuse(list(layers.values()), grids[robots[0]], config.cells) if layers else None
-    outcomes = _outcomes(robots, pairs, forest, layers, fusion)
-    changes, reported = _changes(robots[0], outcomes, state.reported, centres_m, config)
+    outcomes = outcomes_of(robots, pairs, forest, layers, fusion)
+    changes, reported = changes_of(robots[0], outcomes, state.reported, centres_m, config)
     result = MergeResult(outcomes, grids, pairs, fusion.grid if fusion else None, updated, changes)
     return MergeState(result, matches, prepared, centres_m, reported), result
 
@@ -234,101 +180,6 @@ def _layers(reference: str, grids: Mapping[str, Grid], forest: Forest) -> dict[s
         for robot, placement in forest.placements.items()
         if placement.component == reference
     }
-
-
-def _outcomes(
-    robots: Sequence[str],
-    pairs: Mapping[Pair, Match],
-    forest: Forest,
-    layers: Mapping[str, Layer],
-    fusion: Fusion | None,
-) -> dict[str, RobotOutcome]:
-    agreements = dict(zip(layers, fusion.agreements, strict=True)) if fusion else {}
-    outcomes: dict[str, RobotOutcome] = {}
-    for robot in robots:
-        placement = forest.placements.get(robot)
-        if placement is None:
-            outcomes[robot] = RobotOutcome(Status.NO_MAP, Reason(ReasonCode.NO_MAP, "no map that shows anything yet"))
-        elif robot in layers:
-            outcomes[robot] = _placed_outcome(robot, placement, pairs, agreements[robot])
-        else:
-            outcomes[robot] = _unplaced_outcome(robots[0], robot, placement, pairs, has_reference=bool(layers))
-    return outcomes
-
-
-def _placed_outcome(
-    robot: str, placement: Placement, pairs: Mapping[Pair, Match], agreement: Agreement
-) -> RobotOutcome:
-    if placement.via is None:
-        reason = Reason(ReasonCode.REFERENCE, "its map frame is the merged frame")
-        return RobotOutcome(Status.REFERENCE, reason, IDENTITY, agreement, placement)
-    pair = (robot, placement.via) if (robot, placement.via) in pairs else (placement.via, robot)
-    match = pairs[pair]
-    reason = Reason(match.reason.code, f"placed on {placement.via}: {match.reason.message}")
-    return RobotOutcome(Status.MERGED, reason, placement.component_from_map, agreement, placement, pair)
-
-
-def _unplaced_outcome(
-    reference: str, robot: str, placement: Placement, pairs: Mapping[Pair, Match], *, has_reference: bool
-) -> RobotOutcome:
-    pair = _best_refused(reference, robot, pairs)
-    match = pairs[pair] if pair else None
-    scores = match.scores if match else None
-    agreement = Agreement(scores.acceptance, scores.overlap_m2, scores.overlap_fraction) if scores else None
-    if not has_reference:
-        reason = Reason(ReasonCode.NO_REFERENCE_MAP, f"the reference {reference} has no map yet")
-    elif any(match.accepted for pair, match in pairs.items() if robot in pair):
-        message = f"its map fits that of {_partner(robot, pairs)}, but neither is linked to the reference {reference}"
-        reason = Reason(ReasonCode.OTHER_COMPONENT, message)
-    elif match is None or pair is None:
-        reason = Reason(ReasonCode.NO_CANDIDATE, "there is no other map to be placed on")
-    else:
-        other = pair[0] if pair[1] == robot else pair[1]
-        reason = Reason(match.reason.code, f"not placed on {other}: {match.reason.message}")
-    return RobotOutcome(Status.UNMERGED, reason, None, agreement, placement, pair)
-
-
-def _partner(robot: str, pairs: Mapping[Pair, Match]) -> str:
-    return next(a if b == robot else b for (a, b), match in pairs.items() if match.accepted and robot in (a, b))
-
-
-def _best_refused(reference: str, robot: str, pairs: Mapping[Pair, Match]) -> Pair | None:
-    """Return the refused pair of this robot that says most: the highest score, the reference before others."""
-
-    def rank(pair: Pair) -> tuple[float, bool]:
-        scores = pairs[pair].scores
-        return (scores.score_m if scores else float("-inf"), reference in pair)
-
-    refused = [pair for pair, match in pairs.items() if robot in pair and not match.accepted]
-    return max(refused, key=rank, default=None)
-
-
-def _changes(
-    reference: str,
-    outcomes: Mapping[str, RobotOutcome],
-    reported: Mapping[str, Sim2],
-    centres_m: Mapping[str, tuple[float, float]],
-    config: MergeConfig,
-) -> tuple[tuple[Change, ...], dict[str, Sim2]]:
-    """Compare the placements with those reported last."""
-    changes: list[Change] = []
-    now: dict[str, Sim2] = {}
-    for robot, outcome in outcomes.items():
-        pose, before = outcome.merged_from_map, reported.get(robot)
-        if robot == reference:
-            continue
-        if pose is None:
-            if before is not None:
-                changes.append(Change(robot, ChangeKind.WITHDRAWN, outcome.reason))
-            continue
-        now[robot] = pose
-        if before is None:
-            changes.append(Change(robot, ChangeKind.PLACED, outcome.reason))
-        elif pose.is_close(before, distance_m=config.moved_m, angle_rad=config.moved_rad, at_m=centres_m[robot]):
-            now[robot] = before
-        else:
-            changes.append(Change(robot, ChangeKind.MOVED, outcome.reason))
-    return tuple(changes), now
 
 
 def _centre_m(grid: Grid) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from mapmerge.config import MergeConfig
 from replay.errors import UsageError
-from replay.selection import RunPath, TopicChoice
+from replay.runs import RunPath, TopicChoice
 
 NS_PER_S = 1_000_000_000
 DEFAULT_REORDER_WINDOW_NS = 5 * NS_PER_S

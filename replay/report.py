@@ -13,7 +13,8 @@ from typing import Any
 
 from mapmerge.fuse import Agreement
 from mapmerge.match import Match
-from mapmerge.merger import ChangeKind, MergeResult, Pair, RobotOutcome
+from mapmerge.merger import MergeResult
+from mapmerge.outcome import ChangeKind, Pair, RobotOutcome
 from mapmerge.reasons import Reason
 from mapmerge.sim2 import Sim2, wrap_angle
 from replay.events import Report, RobotInput, Skipped

@@ -2,56 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from replay.errors import InputError, UsageError
+from replay.robot_names import file_names, is_costmap_or_mask, names_in, namespace
+from replay.runs import RunPath, TopicChoice
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, SourceInfo
-
-_NOT_A_MAP = re.compile(r"(^|[/_])(costmap|mask|keepout|speed)([/_]|$)", re.IGNORECASE)
-_SUFFIXES = (".zstd", ".bag", ".db3", ".mcap", ".yaml", ".yml")
-_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
-
-
-@dataclass(frozen=True, slots=True)
-class RunPath:
-    """One ``RUN`` argument: a path, and the robot that it is of where that was said."""
-
-    robot: str | None
-    path: Path
-
-    @staticmethod
-    def parse(text: str) -> RunPath:
-        """Read ``PATH`` or ``ROBOT=PATH``; a path that exists is a path even if it has an equals sign."""
-        name, sign, rest = text.partition("=")
-        if not sign or Path(text).exists():
-            return RunPath(None, Path(text))
-        if rest and _NAME.fullmatch(name):
-            return RunPath(name, Path(rest))
-        if not rest or not Path(rest).exists():
-            return RunPath(None, Path(text))
-        raise UsageError(f"{text}: {name!r} is no name for a robot; expected letters, digits, '_', '-' and '.'")
-
-
-@dataclass(frozen=True, slots=True)
-class TopicChoice:
-    """``--topic``: for one robot, or for all with ``{robot}`` in its place."""
-
-    robot: str | None
-    topic: str
-
-    @staticmethod
-    def parse(text: str) -> TopicChoice:
-        """Read ``/{robot}/map`` or ``r1=/x``."""
-        name, sign, rest = text.partition("=")
-        if not sign:
-            name, rest = "", text
-        if not rest or (sign and not name):
-            raise UsageError(f"--topic {text}: expected a topic such as '/{{robot}}/map', or r1=/r1/map for one robot")
-        return TopicChoice(name or None, rest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,9 +88,9 @@ def _discovered(
 ) -> dict[str, Candidates]:
     """Return for each robot that can be named the map topics that may be its own."""
     found: dict[str, Candidates] = {}
-    file_names = _file_names(runs)
+    by_file = file_names(runs)
     for index, (run, info) in enumerate(zip(runs, infos, strict=True)):
-        names = _names_in(run, file_names[index], _grid_topics(info), topics)
+        names = names_in(run, by_file[index], _grid_topics(info), topics)
         for topic, robot in names.items():
             if _chosen(robot, topic, topics):
                 candidates = found.setdefault(robot, {})
@@ -143,7 +101,7 @@ def _discovered(
             found = _without_claimed(found, choice)
     best = {robot: _best(robot, candidates, counts) for robot, candidates in found.items()}
     asked = {run.robot for run in runs} | {choice.robot for choice in topics}
-    maps = {robot for robot, candidates in best.items() if not all(map(_NOT_A_MAP.search, candidates))}
+    maps = {robot for robot, candidates in best.items() if not all(map(is_costmap_or_mask, candidates))}
     return {robot: candidates for robot, candidates in best.items() if not maps or robot in maps | asked}
 
 
@@ -160,64 +118,6 @@ def _without_claimed(found: Mapping[str, Candidates], choice: TopicChoice) -> di
         if kept:
             left[robot] = kept
     return left
-
-
-def _names_in(run: RunPath, file_name: str, topics: Sequence[str], choices: Sequence[TopicChoice]) -> dict[str, str]:
-    """Return the robot of each map topic of one input; ``file_name`` names one whose topics have no namespace."""
-    if run.robot is not None:
-        return dict.fromkeys(topics, run.robot)
-    patterns = [choice.topic for choice in choices if choice.robot is None and "{robot}" in choice.topic]
-    if patterns:
-        return _named_by_patterns(topics, patterns)
-    named = [topic for topic in topics if _namespace(topic)]
-    if any(not _NOT_A_MAP.search(topic) for topic in named):
-        return _named_by_namespace(named)
-    bare = [topic for topic in topics if not _namespace(topic)]
-    return dict.fromkeys(bare, file_name) if bare else _named_by_namespace(named)
-
-
-def _named_by_patterns(topics: Sequence[str], patterns: Sequence[str]) -> dict[str, str]:
-    """Name robots by what stands at ``{robot}`` in the patterns that their topics fit."""
-    names = {}
-    for pattern in patterns:
-        before, *after = map(re.escape, pattern.split("{robot}"))
-        shape = re.compile(before + "([^/]+)" + r"\1".join(after))
-        names.update({topic: match[1] for topic in topics if (match := shape.fullmatch(topic))})
-    return names
-
-
-def _named_by_namespace(topics: Sequence[str]) -> dict[str, str]:
-    """Name robots by the first part of the namespace or, where all share that, by the last."""
-    maps = [topic for topic in topics if not _NOT_A_MAP.search(topic)] or list(topics)
-    names = {}
-    for topic in maps:
-        first = _namespace(topic)[0]
-        alike = {other: _namespace(other) for other in maps if _namespace(other)[0] == first}
-        distinct = len({space[-1] for space in alike.values()})
-        nested = all(len(space) > 1 for space in alike.values())
-        fleet = nested and distinct == len(alike) == len(maps) > 1
-        names[topic] = _namespace(topic)[-1] if fleet else first
-    return names
-
-
-def _namespace(topic: str) -> list[str]:
-    return [part for part in topic.split("/") if part][:-1]
-
-
-def _file_names(runs: Sequence[RunPath]) -> list[str]:
-    """Name robots by their files where nothing else does: two of one name have their folder's name in front."""
-    paths = [run.path.resolve() for run in runs]
-    stems = [_stem(path.name) for path in paths]
-    return [
-        f"{_stem(path.parent.name)}_{stem}" if stems.count(stem) > 1 else stem
-        for path, stem in zip(paths, stems, strict=True)
-    ]
-
-
-def _stem(name: str) -> str:
-    for suffix in _SUFFIXES:
-        name = name.removesuffix(suffix)
-    return re.sub(r"[^A-Za-z0-9_.-]", "_", name)
 
 
 def _chosen(robot: str, topic: str, topics: Sequence[TopicChoice]) -> bool:
@@ -246,7 +146,7 @@ def _by_component(
     found: Candidates = {}
     for index, (run, info) in enumerate(zip(runs, infos, strict=True)):
         for topic in _grid_topics(info):
-            inside = robot in _namespace(topic) or "/".join(_namespace(topic)) == robot.strip("/")
+            inside = robot in namespace(topic) or "/".join(namespace(topic)) == robot.strip("/")
             patterned = any(choice.robot is None for choice in topics) and _chosen(robot, topic, topics)
             if run.robot is None and (patterned or (inside and _chosen(robot, topic, topics))):
                 found[topic] = (*found.get(topic, ()), index)
@@ -261,7 +161,7 @@ def _best(robot: str, candidates: Candidates, counts: Mapping[str, int]) -> Cand
 
     def rank(topic: str) -> tuple[bool, int]:
         empty = counts[topic] == 0
-        if _NOT_A_MAP.search(topic):
+        if is_costmap_or_mask(topic):
             return empty, 3
         if topic == f"/{robot}/map":
             return empty, 0

@@ -14,7 +14,7 @@ from mapmerge.grid import Grid
 from replay.events import Event, Merged
 from replay.options import RunOptions
 from replay.pipeline import merge
-from replay.selection import RunPath
+from replay.runs import RunPath
 from tests.bags import Recorded, write_mcap
 from tests.runs import bad_messages, bare_room, begun_anew, flat_map, growing, in_log_order, seen, two_robots
 

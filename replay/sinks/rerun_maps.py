@@ -12,7 +12,8 @@ import rerun as rr
 
 from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
-from mapmerge.merger import MergeResult, RobotOutcome, Status
+from mapmerge.merger import MergeResult
+from mapmerge.outcome import RobotOutcome, Status
 from mapmerge.prepare import thinned
 from mapmerge.resample import at_resolution
 from mapmerge.sim2 import Points, Sim2

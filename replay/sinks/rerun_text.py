@@ -7,7 +7,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from mapmerge.merger import Change, ChangeKind, MergeResult
+from mapmerge.merger import MergeResult
+from mapmerge.outcome import Change, ChangeKind
 from mapmerge.sim2 import Sim2
 from replay.events import Report, Skipped
 

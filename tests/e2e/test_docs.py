@@ -9,7 +9,7 @@ from importlib import resources
 import jsonschema
 import pytest
 
-from mapmerge.merger import ChangeKind, Status
+from mapmerge.outcome import ChangeKind, Status
 from mapmerge.reasons import ReasonCode
 from replay.events import SkipCause
 from tests.data_paths import ROOT

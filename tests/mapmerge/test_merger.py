@@ -10,7 +10,8 @@ from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError
 from mapmerge.fuse import Layer, fuse
 from mapmerge.grid import Grid
-from mapmerge.merger import Change, ChangeKind, MergeState, Status, step
+from mapmerge.merger import MergeState, step
+from mapmerge.outcome import Change, ChangeKind, Status
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import IDENTITY, Sim2
 from tests.floors import errors, filled, last_map, office_pair, office_run, pair_of

@@ -7,7 +7,7 @@ import pytest
 from replay.errors import InputError
 from replay.info import lines, summarise
 from replay.options import RunOptions
-from replay.selection import RunPath
+from replay.runs import RunPath
 from tests.bags import Recorded, write_mcap, write_rosbag1, write_saved_map
 from tests.runs import bad_messages, flat_map, growing, in_log_order, seen, two_robots, updated
 

@@ -7,7 +7,7 @@ import pytest
 
 from replay.errors import UsageError
 from replay.options import RunOptions, TimeBound, seconds_to_ns
-from replay.selection import RunPath, TopicChoice
+from replay.runs import RunPath, TopicChoice
 
 DAY_NS = 86_400 * 10**9
 

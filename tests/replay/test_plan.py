@@ -9,7 +9,7 @@ import pytest
 from replay.errors import InputError, UsageError
 from replay.options import RunOptions, TimeBound
 from replay.plan import MERGED_FRAME, Plan, open_plan
-from replay.selection import RunPath
+from replay.runs import RunPath
 from replay.sources.base import UPDATE_TYPE
 from tests.bags import SECOND, Recorded, write_mcap, write_rosbag2
 from tests.fakes import FakeSource

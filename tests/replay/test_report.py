@@ -13,7 +13,8 @@ import pytest
 from mapmerge.config import MergeConfig
 from mapmerge.fuse import Agreement
 from mapmerge.grid import Grid
-from mapmerge.merger import MergeResult, MergeState, RobotOutcome, Status, step
+from mapmerge.merger import MergeResult, MergeState, step
+from mapmerge.outcome import RobotOutcome, Status
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
 from replay.errors import BadMessage

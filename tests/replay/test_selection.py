@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from replay.errors import InputError, UsageError
-from replay.selection import RunPath, Selected, TopicChoice, select
+from replay.runs import RunPath, TopicChoice
+from replay.selection import Selected, select
 from replay.sources.base import UPDATE_TYPE, SourceInfo
 from tests.fakes import info_of
 

@@ -18,7 +18,8 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from mapmerge.grid import Grid
-from mapmerge.merger import MergeState, Status, step
+from mapmerge.merger import MergeState, step
+from mapmerge.outcome import Status
 from mapmerge.sim2 import IDENTITY, Sim2
 from replay.errors import OutputError
 from replay.events import Event, Finished, Merged, RobotInput, SkipCause, Skipped, Started, Timing

@@ -1,0 +1,198 @@
+"""Flags: what there is, and the options that they stand for."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from replay import __version__
+from replay.errors import UsageError
+
+if TYPE_CHECKING:
+    from replay.options import OutputOptions, RunOptions
+
+_EXAMPLES = """\
+examples:
+  replay info run.mcap
+  replay merge run.mcap --robots r1,r2
+  replay merge alpha=alpha_bag/ bravo=bravo_bag/ -o out/floor.mcap
+  replay merge today.mcap old=map.yaml --robots r1,old --require-all
+"""
+
+_MERGE_EXAMPLES = """\
+examples:
+  replay merge run.mcap --robots r1,r2       r1 is the reference: its map frame becomes the merged frame
+  replay merge a=alpha.bag b=bravo/          one recording a robot, whatever its map topic is called
+  replay merge run.mcap --topic '/{robot}/slam/map'
+  replay merge run.mcap --start 60 --stop 300 --no-rrd --json
+
+exit status: 0 done; 1 a robot was not merged and --require-all was given; 2 bad usage or input;
+3 an output could not be written, or a bug; 130 interrupted
+"""
+
+
+class _Help(argparse.RawDescriptionHelpFormatter):
+    """Help that reads the same in every version of Python: docs/cli.md is checked against it."""
+
+    def _format_action_invocation(self, action: argparse.Action) -> str:
+        if not action.option_strings or action.nargs == 0:
+            return super()._format_action_invocation(action)
+        value = self._format_args(action, self._get_default_metavar_for_optional(action))
+        return f"{', '.join(action.option_strings)} {value}"
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line; it imports nothing heavy."""
+    program = argparse.ArgumentParser(
+        prog="replay",
+        usage="replay COMMAND ...",
+        description="Merge the occupancy grid maps that several robots recorded, offline, at each timestamp.",
+        epilog=_EXAMPLES,
+        formatter_class=_Help,
+        allow_abbrev=False,
+    )
+    program.add_argument("--version", action="version", version=f"replay {__version__}")
+    commands = program.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    merge = commands.add_parser(
+        "merge",
+        help="merge the maps of a recording and write what came of it",
+        usage="replay merge RUN [RUN ...] [options]",
+        description="Merge the maps of one or more recordings at each timestamp, and write the outcome to a new MCAP,\n"
+        "a Rerun recording and a JSON report.",
+        epilog=_MERGE_EXAMPLES,
+        formatter_class=_Help,
+        allow_abbrev=False,
+    )
+    _input_arguments(merge)
+    _output_arguments(merge)
+    info = commands.add_parser(
+        "info",
+        help="list what recordings hold and what would be merged",
+        usage="replay info RUN [RUN ...] [options]",
+        description="List format, duration, map topics, messages, sizes and resolutions of recordings,\n"
+        "and what would be merged.",
+        formatter_class=_Help,
+        allow_abbrev=False,
+    )
+    _input_arguments(info)
+    return program
+
+
+def _input_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "runs",
+        nargs="+",
+        metavar="RUN",
+        help="a recording, as PATH or ROBOT=PATH: .bag, ROS 2 bag folder, .db3, .mcap, or a saved map's .yaml",
+    )
+    group = parser.add_argument_group("which maps")
+    group.add_argument("--robots", metavar="R1,R2,…", help="robots to merge, the reference first (default: all)")
+    group.add_argument(
+        "--topic",
+        action="append",
+        default=[],
+        metavar="[ROBOT=]TOPIC",
+        help="map topic, for one robot or with {robot} for all; may be repeated",
+    )
+    times = parser.add_argument_group("time")
+    times.add_argument(
+        "--clock",
+        choices=("header", "log"),
+        default="header",
+        help="what times are taken from; log is used where headers have none (default: %(default)s)",
+    )
+    times.add_argument(
+        "--start",
+        metavar="TIME",
+        help="begin at this time, with the last map before it: seconds after the first map, nanoseconds since 1970 "
+        "with ns, or ISO 8601",
+    )
+    times.add_argument("--stop", metavar="TIME", help="use maps before this time")
+    times.add_argument(
+        "--reorder-window",
+        metavar="SECONDS",
+        default="5",
+        help="put messages in order of time within this window (default: %(default)s)",
+    )
+    times.add_argument(
+        "--align-starts",
+        action="store_true",
+        help="let all recordings begin together, on the reference's clock: for clocks that cannot be the same",
+    )
+
+
+def _output_arguments(parser: argparse.ArgumentParser) -> None:
+    outputs = parser.add_argument_group("outputs")
+    outputs.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT.mcap",
+        type=Path,
+        help="the new MCAP, with OUT.rrd and OUT.json beside it (default: NAME.merged.mcap in the current folder)",
+    )
+    outputs.add_argument("--no-rrd", action="store_true", help="write no Rerun recording")
+    outputs.add_argument("--force", action="store_true", help="replace outputs that exist")
+    outputs.add_argument(
+        "--every",
+        metavar="SECONDS",
+        default="0",
+        help="least time between two merged maps in the MCAP; the last is always written (default: at each change)",
+    )
+    outputs.add_argument("--copy-maps", action="store_true", help="copy the robots' own maps to the MCAP")
+    outputs.add_argument(
+        "--images",
+        choices=("none", "changed", "all"),
+        default="changed",
+        help="which intermediate images are written (default: %(default)s)",
+    )
+    outputs.add_argument("--json", action="store_true", help="print the report instead of a table")
+    rules = parser.add_argument_group("rules")
+    rules.add_argument("--strict", action="store_true", help="end with an error at the first message that is unusable")
+    rules.add_argument("--require-all", action="store_true", help="exit with 1 if a robot was not merged")
+
+
+def run_options(options: argparse.Namespace) -> RunOptions:
+    """Return what is to be read and how it is to be merged."""
+    from replay.options import RunOptions, TimeBound, seconds_to_ns
+    from replay.runs import RunPath, TopicChoice
+
+    return RunOptions(
+        runs=tuple(RunPath.parse(text) for text in options.runs),
+        robots=_robots(options.robots),
+        topics=tuple(TopicChoice.parse(text) for text in options.topic),
+        clock=options.clock,
+        start=TimeBound.parse(options.start) if options.start is not None else None,
+        stop=TimeBound.parse(options.stop) if options.stop is not None else None,
+        reorder_window_ns=seconds_to_ns(options.reorder_window),
+        align_starts=options.align_starts,
+        strict=getattr(options, "strict", False),
+        images=getattr(options, "images", "none"),
+    )
+
+
+def _robots(text: str | None) -> tuple[str, ...] | None:
+    if text is None:
+        return None
+    names = tuple(name.strip() for name in text.split(","))
+    if not all(names) or len(set(names)) != len(names):
+        raise UsageError(f"--robots {text}: expected names with commas between them, each once, such as r1,r2")
+    return names
+
+
+def output_options(options: argparse.Namespace, run: RunOptions) -> OutputOptions:
+    """Return what is to be written."""
+    from replay.options import OutputOptions, seconds_to_ns
+
+    first = run.runs[0].path
+    stem = first.resolve().name if first.is_dir() else first.stem
+    path = options.output or Path(f"{stem}.merged.mcap")
+    if path.suffix != ".mcap":
+        raise UsageError(f"--output {path}: expected a name that ends in .mcap")
+    return OutputOptions(
+        mcap=path,
+        rrd=not options.no_rrd,
+        every_ns=seconds_to_ns(options.every),
+        copy_maps=options.copy_maps,
+        force=options.force,
+    )
