@@ -124,6 +124,8 @@ def _unplaced_outcome(
         reason = Reason(ReasonCode.NO_REFERENCE_MAP, f"the reference {reference} has no map yet")
     elif any(match.accepted for pair, match in pairs.items() if robot in pair):
         message = f"its map fits that of {_partner(robot, pairs)}, but neither is linked to the reference {reference}"
+        if pair is not None:
+            message += f"; not placed on {pair[0] if pair[1] == robot else pair[1]}: {pairs[pair].reason.message}"
         reason = Reason(ReasonCode.OTHER_COMPONENT, message)
     elif match is None or pair is None:
         reason = Reason(ReasonCode.NO_CANDIDATE, "there is no other map to be placed on")
