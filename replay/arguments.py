@@ -53,7 +53,7 @@ def parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     program.add_argument("--version", action="version", version=f"replay {__version__}")
-    commands = program.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    commands = program.add_subparsers(prog="replay", dest="command", metavar="COMMAND", required=True)
     merge = commands.add_parser(
         "merge",
         help="merge the maps of a recording and write what came of it",
@@ -106,7 +106,7 @@ def _input_arguments(parser: argparse.ArgumentParser) -> None:
         "--start",
         metavar="TIME",
         help="begin at this time, with the last map before it: seconds after the first map, nanoseconds since 1970 "
-        "with ns, or ISO 8601",
+        "with ns, or ISO 8601, UTC unless it names a zone",
     )
     times.add_argument("--stop", metavar="TIME", help="use maps before this time")
     times.add_argument(
@@ -149,7 +149,9 @@ def _output_arguments(parser: argparse.ArgumentParser) -> None:
     outputs.add_argument("--json", action="store_true", help="print the report instead of a table")
     rules = parser.add_argument_group("rules")
     rules.add_argument("--strict", action="store_true", help="end with an error at the first message that is unusable")
-    rules.add_argument("--require-all", action="store_true", help="exit with 1 if a robot was not merged")
+    rules.add_argument(
+        "--require-all", action="store_true", help="exit with 1 unless two robots or more were merged, all"
+    )
 
 
 def run_options(options: argparse.Namespace) -> RunOptions:

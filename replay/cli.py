@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, NoReturn
 
 from replay import __version__
@@ -70,9 +71,9 @@ def _refuse_outputs(outputs: OutputOptions, run: RunOptions) -> None:
     for path in (name for final in paths for name in (final, PartialFile(final).partial)):
         if {path.resolve(), path.resolve().parent} & inputs:
             raise UsageError(f"{path} is an input, or would be written into one; give another name with --output")
-    existing = [str(path) for path in paths if path.exists()]
+    existing = [str(path) for path in output_paths(replace(outputs, rrd=True)).values() if path.exists()]
     if existing and not outputs.force:
-        raise UsageError(f"{', '.join(existing)} exists already; give --force to replace it, or another --output")
+        raise UsageError(f"there is already {', '.join(existing)}; give --force to replace, or another --output")
     for path in paths:
         if path.is_dir():
             raise OutputError(f"{path}: a folder has this name; remove it, or give another --output")
@@ -92,9 +93,13 @@ def _merge(options: argparse.Namespace) -> int:
     from replay.sinks.terminal import Narrator, ProgressSink, open_console, print_table
 
     notes = open_console(stderr=True)
-    narrator = Narrator(notes, announce=run.robots is None)
-    with open_plan(run) as plan, open_sinks(outputs, extra=(ProgressSink(notes), narrator)) as sinks:
-        report = drain(events(plan, run), sinks).report
+    with open_plan(run) as plan:
+        narrator = Narrator(notes, announce=run.robots is None, unused_topics=plan.unused_topics())
+        with open_sinks(outputs, extra=(ProgressSink(notes), narrator)) as sinks:
+            report = drain(events(plan, run), sinks).report
+    if not outputs.rrd:
+        # one of an earlier run, which --force replaces, must not stand beside these outputs
+        outputs.mcap.with_suffix(".rrd").unlink(missing_ok=True)
     if options.json:
         sys.stdout.write(report_text(report))
     else:
@@ -104,7 +109,9 @@ def _merge(options: argparse.Namespace) -> int:
 
 
 def _all_merged(report: Report) -> bool:
-    return all(robot["status"] in ("reference", "merged") for robot in report["robots"].values())
+    """Tell whether there was something to merge and all of it was."""
+    statuses = [robot["status"] for robot in report["robots"].values()]
+    return len(statuses) > 1 and all(status in ("reference", "merged") for status in statuses)
 
 
 def _info(options: argparse.Namespace) -> int:

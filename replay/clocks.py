@@ -79,6 +79,30 @@ def agreed(probes: Sequence[Probe]) -> list[Probe]:
     return [item.by_log() if (item.robot, item.topic) in by_log else item for item in probes]
 
 
+def refuse_recorded_twice(probes: Sequence[Probe], names: Sequence[str], tolerance_ns: int) -> None:
+    """Refuse a robot that is in several recordings at the same time: parts of one mission follow each other.
+
+    Parameters
+    ----------
+    names
+        Of the inputs.
+    tolerance_ns
+        Parts may overlap by this much.
+    """
+    for index, item in enumerate(probes):
+        for other in probes[:index]:
+            if (item.robot, item.topic) != (other.robot, other.topic) or item.input == other.input:
+                continue
+            if item.first_ns is None or item.last_ns is None or other.first_ns is None or other.last_ns is None:
+                continue
+            if min(item.last_ns, other.last_ns) - max(item.first_ns, other.first_ns) > tolerance_ns:
+                first, second = names[other.input], names[item.input]
+                raise UsageError(
+                    f"robot {item.robot!r} is in {first} and in {second} at the same times; if these are two robots, "
+                    f"name them, as a={first} b={second}, else give one of the two"
+                )
+
+
 def frames(robots: Sequence[str], frame_ids: Mapping[str, str], merged_frame: str) -> dict[str, str]:
     """Return each robot's map frame for the outputs.
 

@@ -14,7 +14,7 @@ from replay.options import RunOptions
 from replay.plan import open_plan
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
-from replay.words import counted
+from replay.words import counted, intention, unused
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +64,15 @@ class RunSummary:
     ----------
     robots
         Robot and topic, the reference first; empty if nothing would be merged.
+    unused
+        Map topics that are no robot's.
     problem
         Why nothing would be merged; None if something would.
     """
 
     inputs: tuple[InputSummary, ...]
     robots: tuple[tuple[str, str], ...]
+    unused: tuple[str, ...]
     problem: str | None
 
 
@@ -86,9 +89,12 @@ def summarise(options: RunOptions) -> RunSummary:
         inputs = tuple(_input(source) for source in sources)
     try:
         with open_plan(options) as plan:
-            return RunSummary(inputs, tuple((item.robot, item.topic) for item in plan.robots), None)
+            robots = tuple((item.robot, item.topic) for item in plan.robots)
+            # who names the robots knows that others are left out
+            left_out = tuple(plan.unused_topics()) if options.robots is None else ()
+            return RunSummary(inputs, robots, left_out, None)
     except ReplayError as error:
-        return RunSummary(inputs, (), str(error))
+        return RunSummary(inputs, (), (), str(error))
 
 
 def _input(source: Source) -> InputSummary:
@@ -146,8 +152,9 @@ def lines(summary: RunSummary) -> Iterator[str]:
     if summary.problem is not None:
         yield f"nothing would be merged: {summary.problem}"
         return
-    reference, *others = (f"{robot} ({topic})" for robot, topic in summary.robots)
-    yield f"would be merged: {', '.join(others) or 'nothing else'} into {reference}, the reference"
+    yield intention([f"{robot} ({topic})" for robot, topic in summary.robots], "would be merged: {} into {}")
+    if summary.unused:
+        yield unused(summary.unused)
 
 
 def _row(topic: TopicSummary) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from replay.arrivals import Feed, Tally, Window
-from replay.clocks import Probe, agreed, frames, offsets_ns, probe
+from replay.clocks import Probe, agreed, frames, offsets_ns, probe, refuse_recorded_twice
 from replay.errors import UsageError
 from replay.events import Clock, RobotInput
 from replay.options import NS_PER_S, RunOptions
@@ -40,6 +40,13 @@ class Plan:
     robots: tuple[RobotInput, ...]
     feeds: tuple[Feed, ...]
     window: Window
+
+    def unused_topics(self) -> list[str]:
+        """Return the map topics with messages that are no robot's in this run, in order of name."""
+        used = {topic for feed in self.feeds for topic in feed.robot_of}
+        there = {item.name for info in self.infos for item in info.topics if item.msgtype == GRID_TYPE}
+        empty = {item.name for info in self.infos for item in info.topics if item.message_count == 0}
+        return sorted(there - used - empty)
 
     def describe_inputs(self, tallies: tuple[Tally, ...] | None = None) -> tuple[Mapping[str, Any], ...]:
         """Return what is said of the inputs in reports; counts and digests only once all was read."""
@@ -79,6 +86,7 @@ def _plan(sources: list[Source], options: RunOptions) -> Plan:
     infos = tuple(source.info for source in sources)
     selected = select(options.runs, infos, robots=options.robots, topics=options.topics)
     probes = agreed(_probes(sources, infos, selected, options))
+    refuse_recorded_twice(probes, [run.path.name for run in options.runs], options.reorder_window_ns)
     offsets = offsets_ns(selected[0].robot, probes, align_starts=options.align_starts)
     start_ns, stop_ns = _span_ns(probes, offsets)
     window = Window(

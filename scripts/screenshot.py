@@ -90,6 +90,8 @@ def main() -> int:
     parser.add_argument("--time-fraction", type=float, help="0 for the start to 1 for the end; default: as it opens")
     parser.add_argument("--size", default="1400x900", help="of the window (default: %(default)s)")
     arguments = parser.parse_args()
+    if not arguments.recording.is_file():
+        parser.error(f"{arguments.recording}: there is no such file")
     with viewer(arguments.size) as client:
         show(client, arguments.recording, arguments.time_fraction)
         time.sleep(_NOTICES_S)  # until the viewer's own notices are gone

@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from replay.events import Event, Merged, Report, Skipped, Started
-from replay.words import counted
+from replay.words import counted, intention, unused
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -67,11 +67,14 @@ class Narrator:
     ----------
     announce
         Whether to say which robots were chosen.
+    unused_topics
+        Map topics that are no robot's.
     """
 
-    def __init__(self, console: Console, *, announce: bool) -> None:
+    def __init__(self, console: Console, *, announce: bool, unused_topics: Sequence[str] = ()) -> None:
         self._console = console
         self._announce = announce
+        self._unused = unused_topics
         self._begin_s = perf_counter()
         self._merge_s = 0.0
         self._render_s = 0.0
@@ -81,8 +84,9 @@ class Narrator:
     def take(self, event: Event) -> None:
         """Say what is worth a line, and add up the time."""
         if isinstance(event, Started) and self._announce:
-            reference, *others = (f"{item.robot} ({item.topic})" for item in event.robots)
-            self._say(f"merging {', '.join(others) or 'nothing else'} into {reference}, the reference")
+            self._say(intention([f"{item.robot} ({item.topic})" for item in event.robots], "merging {} into {}"))
+            if self._unused:
+                self._say(unused(self._unused))
         elif isinstance(event, Skipped):
             self._say_skipped(event)
         elif isinstance(event, Merged):
@@ -150,7 +154,7 @@ def print_table(console: Console, report: Report) -> None:
             Text(robot),
             Text(status, style=_STYLES[status]),
             *_pose(row["merged_from_map"]),
-            _figure(row["acceptance"], "{:.3f}"),
+            _figure(None if row["acceptance"] is None else math.floor(row["acceptance"] * 1000) / 1000, "{:.3f}"),
             _figure(row["overlap_m2"], "{:.1f} m²"),
             Text(row["reason"]["message"]),
         )

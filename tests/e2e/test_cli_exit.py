@@ -55,6 +55,12 @@ def test_require_all(replay: Program, two: Path, tmp_path: Path) -> None:
     assert ran.mcap.exists()
 
 
+def test_require_all_is_not_met_by_one_robot_alone(replay: Program, tmp_path: Path) -> None:
+    run = write_mcap(tmp_path / "run.mcap", growing("r1"))
+    assert replay.merge(run).status == 0
+    assert replay.merge(run, "--require-all", "--force").status == 1
+
+
 def test_require_all_counts_a_robot_without_a_map(replay: Program, tmp_path: Path) -> None:
     messages = [*growing("r1"), seen("r2", 3.0, resolution=0.0)]
     ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages), "--require-all")
@@ -131,11 +137,8 @@ class TestInfo:
         ran = replay("info", two)
         assert (ran.status, ran.err) == (0, "")
         assert ran.out.splitlines()[-1] == "would be merged: r2 (/r2/map) into r1 (/r1/map), the reference"
-        assert (
-            replay("info", two, "--robots", "r2")
-            .out.splitlines()[-1]
-            .endswith("nothing else into r2 (/r2/map), the reference")
-        )
+        alone = replay("info", two, "--robots", "r2").out.splitlines()[-1]
+        assert alone == "there is only one map, r2 (/r2/map): nothing to merge it with"
 
     def test_says_why_nothing_would(self, replay: Program, two: Path) -> None:
         ran = replay("info", two, "--robots", "r9")

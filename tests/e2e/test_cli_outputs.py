@@ -63,10 +63,12 @@ def test_what_exists_is_refused_without_force(replay: Program, two: Path, tmp_pa
     assert (tmp_path / name).read_bytes()[:8] != b"dear to "
 
 
-def test_a_file_that_is_not_written_may_exist(replay: Program, two: Path, tmp_path: Path) -> None:
+def test_no_recording_of_another_run_stays_beside_the_outputs(replay: Program, two: Path, tmp_path: Path) -> None:
     (tmp_path / "out.rrd").write_text("of another run")
-    assert replay("merge", two, "-o", "out.mcap", "--no-rrd", "--images", "none").status == 0
+    assert replay("merge", two, "-o", "out.mcap", "--no-rrd", "--images", "none").status == 2
     assert (tmp_path / "out.rrd").read_text() == "of another run"
+    assert replay("merge", two, "-o", "out.mcap", "--no-rrd", "--images", "none", "--force").status == 0
+    assert not (tmp_path / "out.rrd").exists()
 
 
 def test_a_failed_run_leaves_what_was_there(replay: Program, two: Path) -> None:

@@ -176,3 +176,30 @@ class TestNames:
         ran = replay.merge(first, "--copy-maps", "--robots", "merged,r2")
         assert ran.statuses == {"merged": "reference", "r2": "merged"}
         assert len([topic for topic in topics(ran.mcap) if topic.endswith("/map")]) == 3
+
+
+class TestSeveralRecordings:
+    def test_two_at_one_time_are_not_one_robot(self, replay: Program, tmp_path: Path) -> None:
+        """As two buildings whose robots have the same names: taken for one, the map would jump between them."""
+        one = write_mcap(tmp_path / "one.mcap", growing("r1"))
+        other = write_mcap(tmp_path / "other.mcap", growing("r1", 5.0))
+        for runs in ((one, other), (one, one), (f"a={one}", f"a={other}")):
+            ran = replay.merge(*runs)
+            assert ran.status == 2
+            assert "at the same times; if these are two robots, name them, as a=one.mcap b=" in ran.error
+        assert replay.merge(f"a={one}", f"b={other}").statuses["a"] == "reference"
+
+    def test_parts_follow_each_other(self, replay: Program, tmp_path: Path) -> None:
+        parts = [write_mcap(tmp_path / f"part_{part}.mcap", growing("r1", 60.0 * part)) for part in (0, 1)]
+        ran = replay.merge(*parts)
+        assert (ran.status, ran.statuses) == (0, {"r1": "reference"})
+        assert [item["messages"] for item in ran.report["inputs"]] == [3, 3]
+
+
+def test_map_topics_that_are_left_out_are_said(replay: Program, tmp_path: Path) -> None:
+    messages = in_log_order(growing("r2"), growing("r1", 1.0, topic="/map"))
+    run = write_mcap(tmp_path / "run.mcap", messages)
+    said = "not used: /map; to use one, say whose it is, as --topic r1=/map"
+    assert said in replay.merge(run).err
+    assert said in replay("info", run).out
+    assert replay.merge(run, "--topic", "r1=/map", "--force").statuses.keys() == {"r1", "r2"}

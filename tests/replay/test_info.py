@@ -41,7 +41,7 @@ def test_what_changes_and_what_cannot_be_used(tmp_path: Path) -> None:
         assert part in row
     assert "map_msgs/msg/OccupancyGridUpdate" in updates
     assert "1 message" in updates
-    assert plan == "would be merged: nothing else into r1 (/r1/map), the reference"
+    assert plan == "there is only one map, r1 (/r1/map): nothing to merge it with"
 
 
 def test_log_times_and_no_frame(tmp_path: Path) -> None:
