@@ -90,6 +90,7 @@ def _merge(options: argparse.Namespace) -> int:
     from replay.plan import open_plan
     from replay.sinks import open_sinks, output_paths
     from replay.sinks.json_file import report_text
+    from replay.sinks.partial_file import output_errors
     from replay.sinks.terminal import Narrator, ProgressSink, open_console, print_table
 
     notes = open_console(stderr=True)
@@ -99,7 +100,9 @@ def _merge(options: argparse.Namespace) -> int:
             report = drain(events(plan, run), sinks).report
     if not outputs.rrd:
         # one of an earlier run, which --force replaces, must not stand beside these outputs
-        outputs.mcap.with_suffix(".rrd").unlink(missing_ok=True)
+        stale = outputs.mcap.with_suffix(".rrd")
+        with output_errors(stale):
+            stale.unlink(missing_ok=True)
     if options.json:
         sys.stdout.write(report_text(report))
     else:
