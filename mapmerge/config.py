@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
+from typing import Literal
 
 from mapmerge.errors import ConfigError
 
-_DIVISORS = {"wall_spacing_m", "angle_step_rad", "cell_m", "reject_m", "blur_cells"}
+ScaleChoice = Literal["metadata", "free"]
+
+_DIVISORS = {"scale_range", "wall_spacing_m", "angle_step_rad", "cell_m", "reject_m", "blur_cells"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +140,8 @@ class VerifyConfig(_Settings):
         Least share of the walls in the overlap that the other map has as well, in the worse of both directions.
     min_margin
         Least lead over the best distinct rival, as a share of the score.
+    min_confidence
+        Least calibrated probability that the placement is right, where the method states one.
     distinct_m, distinct_rad
         Placements that differ by more than one of these are rivals, not the same.
     """
@@ -149,6 +154,7 @@ class VerifyConfig(_Settings):
     min_acceptance: float = 0.95
     min_wall_agreement: float = 0.8
     min_margin: float = 0.4
+    min_confidence: float = 0.999
     distinct_m: float = 0.75
     distinct_rad: float = math.radians(5.0)
 
@@ -161,11 +167,18 @@ class MergeConfig(_Settings):
     ----------
     method
         A name of `mapmerge.match.MATCHERS`.
+    scale
+        Whether the maps' resolutions are believed (``metadata``: placements are rigid) or the ratio of their true
+        resolutions is estimated as well (``free``).
+    scale_range
+        Least and largest factor by which the ratio of resolutions may be wrong, with ``free``.
     moved_m, moved_rad
         A placement that changed by more than one of these since it was last reported has moved.
     """
 
     method: str = "correlation"
+    scale: ScaleChoice = "metadata"
+    scale_range: tuple[float, float] = (0.4, 2.5)
     cells: CellConfig = field(default_factory=CellConfig)
     search: SearchConfig = field(default_factory=SearchConfig)
     refine: RefineConfig = field(default_factory=RefineConfig)

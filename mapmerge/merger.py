@@ -17,6 +17,7 @@ from mapmerge.graph import Edge, Forest, place
 from mapmerge.grid import Grid
 from mapmerge.match import Match, load_matcher
 from mapmerge.outcome import Change, Pair, RobotOutcome, Status, changes_of, outcomes_of
+from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
 
@@ -89,11 +90,27 @@ class MergeState:
         return MergeState(MergeResult(outcomes, {}, {}, None, (), ()))
 
 
-def step(state: MergeState, updates: Mapping[str, Grid], config: MergeConfig) -> tuple[MergeState, MergeResult]:
+def step(
+    state: MergeState,
+    updates: Mapping[str, Grid],
+    config: MergeConfig,
+    priors: Mapping[str, Prior] | None = None,
+) -> tuple[MergeState, MergeResult]:
     """Take in new maps and return what is known then.
 
     Maps that say what was known already cost nothing: pairs of unchanged maps are not matched again. A map in which
     nothing is known is no map.
+
+    Parameters
+    ----------
+    state
+        What the last step returned.
+    updates
+        New maps.
+    config
+        Settings.
+    priors
+        Where robots' map frames are believed to lie in the reference's.
 
     Raises
     ------
@@ -114,7 +131,7 @@ def step(state: MergeState, updates: Mapping[str, Grid], config: MergeConfig) ->
         if robot in updated or robot in state.result.grids
     }
     maps = {robot: grid for robot, grid in grids.items() if grid.known.any()}
-    matches, prepared = _matched(state, maps, updated, config)
+    matches, prepared = _matched(state, maps, updated, config, priors or {})
     centres_m = {robot: _centre_m(maps[robot]) if robot in updated else state.centres_m[robot] for robot in maps}
     forest = _placed(centres_m, matches, config)
     pairs = _without_contradicted(matches, forest)
@@ -131,7 +148,11 @@ def _is_new(update: Grid | None, known: Grid | None) -> bool:
 
 
 def _matched(
-    state: MergeState, grids: Mapping[str, Grid], updated: Sequence[str], config: MergeConfig
+    state: MergeState,
+    grids: Mapping[str, Grid],
+    updated: Sequence[str],
+    config: MergeConfig,
+    priors: Mapping[str, Prior],
 ) -> tuple[dict[Pair, Match], dict[tuple[str, float], Any]]:
     """Match every pair of which a map changed; keep the matches of the others."""
     matcher = load_matcher(config.method)
@@ -146,8 +167,16 @@ def _matched(
             if (robot, resolution_m) not in prepared:
                 prepared[robot, resolution_m] = matcher.prepare(grids[robot], resolution_m, config)
         target, source = (prepared[robot, resolution_m] for robot in pair)
-        pairs[pair] = matcher.match(target, source, config)
+        pairs[pair] = matcher.match(target, source, config, _prior_of(pair, next(iter(state.result.robots)), priors))
     return pairs, prepared
+
+
+def _prior_of(pair: Pair, reference: str, priors: Mapping[str, Prior]) -> Prior | None:
+    """Return what is believed of a pair, from what is believed of both robots' places in the reference's frame."""
+    target, source = pair
+    if source not in priors or (target != reference and target not in priors):
+        return None
+    return priors[source] if target == reference else priors[target].inverse().compose(priors[source])
 
 
 def _placed(centres_m: Mapping[str, tuple[float, float]], pairs: Mapping[Pair, Match], config: MergeConfig) -> Forest:

@@ -58,6 +58,9 @@ class RobotOutcome:
         Its place in its component; None without a map.
     shown_pair
         The match that placed it or, if it is not placed, its best refused one.
+    confidence
+        Probability that it is placed rightly, through all matches that place it; None where it is not placed, or
+        the method states none.
     """
 
     status: Status
@@ -66,6 +69,7 @@ class RobotOutcome:
     agreement: Agreement | None = None
     placement: Placement | None = None
     shown_pair: Pair | None = None
+    confidence: float | None = None
 
 
 def outcomes_of(

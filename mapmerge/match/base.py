@@ -8,6 +8,7 @@ from typing import Protocol, TypeVar
 from mapmerge.config import MergeConfig
 from mapmerge.evidence import Evidence
 from mapmerge.grid import Grid
+from mapmerge.prior import Prior
 from mapmerge.reasons import Reason
 from mapmerge.sim2 import Sim2
 from mapmerge.verify import Scores
@@ -45,6 +46,8 @@ class Match:
         Whether it passed every test.
     reason
         What decided.
+    confidence
+        Calibrated probability that the placement is right; None where the method states none.
     rivals
         Distinct placements of the same pair, best first.
     evidence
@@ -55,6 +58,7 @@ class Match:
     scores: Scores | None
     accepted: bool
     reason: Reason
+    confidence: float | None = None
     rivals: tuple[Rival, ...] = ()
     evidence: tuple[Evidence, ...] = ()
 
@@ -69,6 +73,9 @@ class Matcher(Protocol[PreparedT]):
         """Return all that depends on one map only, at a resolution that is not finer than the map's own."""
         ...
 
-    def match(self, target: PreparedT, source: PreparedT, config: MergeConfig) -> Match:
-        """Return where the source's map lies in the target's map frame, or why that cannot be said."""
+    def match(self, target: PreparedT, source: PreparedT, config: MergeConfig, prior: Prior | None = None) -> Match:
+        """Return where the source's map lies in the target's map frame, or why that cannot be said.
+
+        With a prior only placements within it are accepted.
+        """
         ...

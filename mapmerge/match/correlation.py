@@ -20,6 +20,7 @@ from mapmerge.match.base import Match, Rival
 from mapmerge.match.spectrum import Spectrum, orientation_spectrum, rotation_peaks, spectrum_correlation
 from mapmerge.match.surface import CorrelationSurface, Peak, TranslationSearch, surface_peaks
 from mapmerge.prepare import PreparedMap, prepare
+from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.refine import evenly, polish, refine
 from mapmerge.sim2 import Sim2
@@ -58,7 +59,7 @@ class CorrelationMatcher:
             prepared, orientation_spectrum(prepared.walls_m, config.search.angle_step_rad, prepared.wall_spacing_m)
         )
 
-    def match(self, target: _Prepared, source: _Prepared, config: MergeConfig) -> Match:
+    def match(self, target: _Prepared, source: _Prepared, config: MergeConfig, prior: Prior | None = None) -> Match:
         """Return the best placement of the source on the target, accepted or refused."""
         poor = _too_little_structure(target.map, source.map, config)
         if poor is not None:

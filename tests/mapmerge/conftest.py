@@ -45,7 +45,7 @@ class ScriptedMatcher:
         self.prepared.append((int(grid.cells[0, 0]), resolution_m))
         return self.prepared[-1]
 
-    def match(self, target, source, config):
+    def match(self, target, source, config, prior=None):
         assert config is self.config
         assert target[1] == source[1]
         pair = target[0], source[0]
