@@ -34,6 +34,8 @@ class MergeResult:
         Latest map of each robot that sent one.
     pairs
         Latest match of each pair of robots with maps, target first.
+    priors
+        What was believed of each of these pairs when it was matched; pairs of which nothing was are left out.
     merged
         The fused map, in the merged frame, which is the reference's map frame; None until the reference has a map.
     updated
@@ -45,6 +47,7 @@ class MergeResult:
     robots: Mapping[str, RobotOutcome]
     grids: Mapping[str, Grid]
     pairs: Mapping[Pair, Match]
+    priors: Mapping[Pair, Prior]
     merged: Grid | None
     updated: tuple[str, ...]
     changes: tuple[Change, ...]
@@ -87,7 +90,7 @@ class MergeState:
             raise ConfigError(f"robots are {list(robots)}; expected at least one, each once")
         waiting = Reason(ReasonCode.NO_MAP, "no map that shows anything yet")
         outcomes = {robot: RobotOutcome(Status.NO_MAP, waiting) for robot in robots}
-        return MergeState(MergeResult(outcomes, {}, {}, None, (), ()))
+        return MergeState(MergeResult(outcomes, {}, {}, {}, None, (), ()))
 
 
 def step(
@@ -98,8 +101,8 @@ def step(
 ) -> tuple[MergeState, MergeResult]:
     """Take in new maps and return what is known then.
 
-    Maps that say what was known already cost nothing: pairs of unchanged maps are not matched again. A map in which
-    nothing is known is no map.
+    Maps that say what was known already cost nothing: pairs of unchanged maps are not matched again, unless what is
+    believed of them changed. A map in which nothing is known is no map.
 
     Parameters
     ----------
@@ -110,7 +113,7 @@ def step(
     config
         Settings.
     priors
-        Where robots' map frames are believed to lie in the reference's.
+        Where robots' map frames are believed to lie in the reference's. Without a new map they change nothing.
 
     Raises
     ------
@@ -131,7 +134,8 @@ def step(
         if robot in updated or robot in state.result.grids
     }
     maps = {robot: grid for robot, grid in grids.items() if grid.known.any()}
-    matches, prepared = _matched(state, maps, updated, config, priors or {})
+    believed = _pair_priors(robots[0], list(combinations(maps, 2)), priors or {}, state.result.priors)
+    matches, prepared = _matched(state, maps, updated, config, believed)
     centres_m = {robot: _centre_m(maps[robot]) if robot in updated else state.centres_m[robot] for robot in maps}
     forest = _placed(centres_m, matches, config)
     pairs = _without_contradicted(matches, forest)
@@ -139,7 +143,8 @@ def step(
     fusion = fuse(list(layers.values()), grids[robots[0]], config.cells) if layers else None
     outcomes = outcomes_of(robots, pairs, forest, layers, fusion)
     changes, reported = changes_of(robots[0], outcomes, state.reported, centres_m, config)
-    result = MergeResult(outcomes, grids, pairs, fusion.grid if fusion else None, updated, changes)
+    merged = fusion.grid if fusion else None
+    result = MergeResult(outcomes, grids, pairs, believed, merged, updated, changes)
     return MergeState(result, matches, prepared, centres_m, reported), result
 
 
@@ -152,14 +157,15 @@ def _matched(
     grids: Mapping[str, Grid],
     updated: Sequence[str],
     config: MergeConfig,
-    priors: Mapping[str, Prior],
+    priors: Mapping[Pair, Prior],
 ) -> tuple[dict[Pair, Match], dict[tuple[str, float], Any]]:
-    """Match every pair of which a map changed; keep the matches of the others."""
+    """Match every pair of which a map, or what is believed of it, changed; keep the matches of the others."""
     matcher = load_matcher(config.method)
     prepared = {key: value for key, value in state.prepared.items() if key[0] not in updated}
     pairs: dict[Pair, Match] = {}
     for pair in combinations(grids, 2):
-        if pair in state.matches and not set(pair) & set(updated):
+        believed_as_before = priors.get(pair) is state.result.priors.get(pair)
+        if pair in state.matches and believed_as_before and not set(pair) & set(updated):
             pairs[pair] = state.matches[pair]
             continue
         resolution_m = max(config.search.working_cell_m, *(grids[robot].resolution_m for robot in pair))
@@ -167,8 +173,20 @@ def _matched(
             if (robot, resolution_m) not in prepared:
                 prepared[robot, resolution_m] = matcher.prepare(grids[robot], resolution_m, config)
         target, source = (prepared[robot, resolution_m] for robot in pair)
-        pairs[pair] = matcher.match(target, source, config, _prior_of(pair, next(iter(state.result.robots)), priors))
+        pairs[pair] = matcher.match(target, source, config, priors.get(pair))
     return pairs, prepared
+
+
+def _pair_priors(
+    reference: str, pairs: Sequence[Pair], priors: Mapping[str, Prior], before: Mapping[Pair, Prior]
+) -> dict[Pair, Prior]:
+    """Return what is believed of each pair: the very value of before, where it differs from that by jitter only."""
+    believed: dict[Pair, Prior] = {}
+    for pair in pairs:
+        prior, known = _prior_of(pair, reference, priors), before.get(pair)
+        if prior is not None:
+            believed[pair] = known if known is not None and known.is_about(prior) else prior
+    return believed
 
 
 def _prior_of(pair: Pair, reference: str, priors: Mapping[str, Prior]) -> Prior | None:

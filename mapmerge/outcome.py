@@ -99,22 +99,43 @@ def outcomes_of(
         if placement is None:
             outcomes[robot] = RobotOutcome(Status.NO_MAP, Reason(ReasonCode.NO_MAP, "no map that shows anything yet"))
         elif robot in layers:
-            outcomes[robot] = _placed_outcome(robot, placement, pairs, agreements[robot])
+            confidence = _confidence(robot, forest, pairs)
+            outcomes[robot] = _placed_outcome(robot, placement, pairs, agreements[robot], confidence)
         else:
             outcomes[robot] = _unplaced_outcome(robots[0], robot, placement, pairs, has_reference=bool(layers))
     return outcomes
 
 
 def _placed_outcome(
-    robot: str, placement: Placement, pairs: Mapping[Pair, Match], agreement: Agreement
+    robot: str, placement: Placement, pairs: Mapping[Pair, Match], agreement: Agreement, confidence: float | None
 ) -> RobotOutcome:
     if placement.via is None:
         reason = Reason(ReasonCode.REFERENCE, "its map frame is the merged frame")
         return RobotOutcome(Status.REFERENCE, reason, IDENTITY, agreement, placement)
-    pair = (robot, placement.via) if (robot, placement.via) in pairs else (placement.via, robot)
+    pair = _pair_of(robot, placement.via, pairs)
     match = pairs[pair]
     reason = Reason(match.reason.code, f"placed on {placement.via}: {match.reason.message}")
-    return RobotOutcome(Status.MERGED, reason, placement.component_from_map, agreement, placement, pair)
+    return RobotOutcome(Status.MERGED, reason, placement.component_from_map, agreement, placement, pair, confidence)
+
+
+def _pair_of(robot: str, other: str, pairs: Mapping[Pair, Match]) -> Pair:
+    return (robot, other) if (robot, other) in pairs else (other, robot)
+
+
+def _confidence(robot: str, forest: Forest, pairs: Mapping[Pair, Match]) -> float | None:
+    """Return how likely all matches are right that place a robot, one on the other, up to the reference.
+
+    None for the reference itself, and if one of the matches states no confidence.
+    """
+    confidence: float | None = None
+    via = forest.placements[robot].via
+    while via is not None:
+        link = pairs[_pair_of(robot, via, pairs)].confidence
+        if link is None:
+            return None
+        confidence = link if confidence is None else confidence * link
+        robot, via = via, forest.placements[via].via
+    return confidence
 
 
 def _unplaced_outcome(
@@ -144,11 +165,16 @@ def _partner(robot: str, pairs: Mapping[Pair, Match]) -> str:
 
 
 def _best_refused(reference: str, robot: str, pairs: Mapping[Pair, Match]) -> Pair | None:
-    """Return the refused pair of this robot that says most: the highest score, the reference before others."""
+    """Return the refused pair of this robot that says most.
 
-    def rank(pair: Pair) -> tuple[float, bool]:
-        scores = pairs[pair].scores
-        return (scores.score_m if scores else float("-inf"), reference in pair)
+    That is one whose maps contradict what was believed, for there somebody was wrong; else the one with the highest
+    score, the reference before others.
+    """
+
+    def rank(pair: Pair) -> tuple[bool, float, bool]:
+        match = pairs[pair]
+        contradicted = match.reason.code is ReasonCode.PRIOR_CONTRADICTED
+        return (contradicted, match.scores.score_m if match.scores else float("-inf"), reference in pair)
 
     refused = [pair for pair, match in pairs.items() if robot in pair and not match.accepted]
     return max(refused, key=rank, default=None)

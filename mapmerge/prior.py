@@ -10,6 +10,8 @@ from mapmerge.sim2 import Sim2, wrap_angle
 WITHIN_SIGMAS = 3.0
 """A placement within so many standard deviations of a prior is within the prior."""
 
+_UNCHANGED_SIGMAS = 0.01
+
 
 @dataclass(frozen=True, slots=True)
 class Prior:
@@ -40,17 +42,27 @@ class Prior:
             and abs(wrap_angle(target_from_source.yaw_rad - believed.yaw_rad)) <= WITHIN_SIGMAS * self.sigma_yaw_rad
         )
 
+    def is_about(self, other: Prior) -> bool:
+        """Tell whether another belief is this one but for jitter: no part differs by a hundredth of its spread."""
+        one, two = self.target_from_source, other.target_from_source
+        differences = (
+            (self.sigma_x_m, one.x_m - two.x_m, self.sigma_x_m - other.sigma_x_m),
+            (self.sigma_y_m, one.y_m - two.y_m, self.sigma_y_m - other.sigma_y_m),
+            (self.sigma_yaw_rad, wrap_angle(one.yaw_rad - two.yaw_rad), self.sigma_yaw_rad - other.sigma_yaw_rad),
+        )
+        return self.origin == other.origin and all(
+            max(abs(moved), abs(wider)) <= _UNCHANGED_SIGMAS * sigma for sigma, moved, wider in differences
+        )
+
     def inverse(self) -> Prior:
         """Return the same belief with the maps swapped."""
         back = self.target_from_source.inverse()
-        # an error of the turn moves what is far from the origin; the position's spread is turned with the frame
         reach_m = math.hypot(back.x_m, back.y_m) * self.sigma_yaw_rad
-        c2, s2 = math.cos(back.yaw_rad) ** 2, math.sin(back.yaw_rad) ** 2
-        var_x, var_y = (self.sigma_x_m * back.scale) ** 2, (self.sigma_y_m * back.scale) ** 2
+        sigma_x_m, sigma_y_m = self.turned_sigmas_m(back)
         return Prior(
             back,
-            math.sqrt(c2 * var_x + s2 * var_y + reach_m**2),
-            math.sqrt(s2 * var_x + c2 * var_y + reach_m**2),
+            math.hypot(sigma_x_m, reach_m),
+            math.hypot(sigma_y_m, reach_m),
             self.sigma_yaw_rad,
             self.origin,
         )
@@ -58,15 +70,24 @@ class Prior:
     def compose(self, other: Prior) -> Prior:
         """Return the belief of ``self @ other``: the target of ``self`` from the source of ``other``."""
         pose = self.target_from_source @ other.target_from_source
-        reach_m = math.hypot(other.target_from_source.x_m, other.target_from_source.y_m) * self.sigma_yaw_rad
-        c2, s2 = math.cos(self.target_from_source.yaw_rad) ** 2, math.sin(self.target_from_source.yaw_rad) ** 2
+        # an error of the turn moves what is far from the origin
         scale = self.target_from_source.scale
-        var_x, var_y = (other.sigma_x_m * scale) ** 2, (other.sigma_y_m * scale) ** 2
+        reach_m = math.hypot(other.target_from_source.x_m, other.target_from_source.y_m) * scale * self.sigma_yaw_rad
+        sigma_x_m, sigma_y_m = other.turned_sigmas_m(self.target_from_source)
         origin = self.origin if self.origin == other.origin else f"{self.origin} and {other.origin}"
         return Prior(
             pose,
-            math.sqrt(self.sigma_x_m**2 + c2 * var_x + s2 * var_y + reach_m**2),
-            math.sqrt(self.sigma_y_m**2 + s2 * var_x + c2 * var_y + reach_m**2),
+            math.hypot(self.sigma_x_m, sigma_x_m, reach_m),
+            math.hypot(self.sigma_y_m, sigma_y_m, reach_m),
             math.hypot(self.sigma_yaw_rad, other.sigma_yaw_rad),
             origin,
         )
+
+    def turned_sigmas_m(self, frame: Sim2) -> tuple[float, float]:
+        """Return the position's spread along the axes of another frame, at least what it is.
+
+        Its parts add up as they are, not as squares: what was turned before has errors that go together, and what is
+        within the prior must not fall out of it because the maps are swapped.
+        """
+        cos, sin = abs(math.cos(frame.yaw_rad)) * frame.scale, abs(math.sin(frame.yaw_rad)) * frame.scale
+        return cos * self.sigma_x_m + sin * self.sigma_y_m, sin * self.sigma_x_m + cos * self.sigma_y_m

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from replay import __version__
 from replay.errors import UsageError
@@ -26,6 +27,7 @@ examples:
   replay merge a=alpha.bag b=bravo/          one recording a robot, whatever its map topic is called
   replay merge run.mcap --topic '/{robot}/slam/map'
   replay merge run.mcap --start 60 --stop 300 --no-rrd --json
+  replay merge run.mcap --init-pose r2=4.5,-1.2,90deg+-0.5,+-0.5,+-5deg
 
 exit status: 0 done; 1 a robot was not merged and --require-all was given; 2 bad usage or input;
 3 an output could not be written, or a bug; 130 interrupted
@@ -65,6 +67,7 @@ def parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     _input_arguments(merge)
+    _placing_arguments(merge)
     _output_arguments(merge)
     info = commands.add_parser(
         "info",
@@ -122,6 +125,38 @@ def _input_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _placing_arguments(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("how maps are placed")
+    group.add_argument("--method", metavar="NAME", default="correlation", help="correlation (default: %(default)s)")
+    group.add_argument(
+        "--scale",
+        choices=("metadata", "free"),
+        default="metadata",
+        help="believe the maps' resolutions, or estimate how far their ratio is off, 0.4 to 2.5 times "
+        "(default: %(default)s)",
+    )
+    group.add_argument(
+        "--min-confidence",
+        metavar="P",
+        default="0.999",
+        help="least probability that a placement is right (default: %(default)s, at most 1 wrong in 1000 accepted)",
+    )
+    group.add_argument(
+        "--init-pose",
+        action="append",
+        default=[],
+        metavar="R=X,Y,YAW[±SX,±SY,±SYAW]",
+        help="where R's map frame lies in the reference's, metres and radians, or degrees with deg or °; the spread is "
+        "a standard deviation, placements within 3 are searched; +- does for ± (default spread: 1 m, 1 m, 10°); "
+        "may be repeated",
+    )
+    group.add_argument(
+        "--use-tf",
+        action="store_true",
+        help="take such poses from transforms between map frames in /tf and /tf_static (spread: 0.5 m, 0.5 m, 5°)",
+    )
+
+
 def _output_arguments(parser: argparse.ArgumentParser) -> None:
     outputs = parser.add_argument_group("outputs")
     outputs.add_argument(
@@ -159,6 +194,7 @@ def run_options(options: argparse.Namespace) -> RunOptions:
     from replay.options import RunOptions, TimeBound, seconds_to_ns
     from replay.runs import RunPath, TopicChoice
 
+    placing = _placing_options(options) if options.command == "merge" else {}
     return RunOptions(
         runs=tuple(RunPath.parse(text) for text in options.runs),
         robots=_robots(options.robots),
@@ -170,7 +206,34 @@ def run_options(options: argparse.Namespace) -> RunOptions:
         align_starts=options.align_starts,
         strict=getattr(options, "strict", False),
         images=getattr(options, "images", "none"),
+        **placing,
     )
+
+
+def _placing_options(options: argparse.Namespace) -> dict[str, Any]:
+    """Return how maps are placed, as keywords of `RunOptions`."""
+    from mapmerge.config import MergeConfig, VerifyConfig
+    from mapmerge.match import MATCHERS
+    from replay.init_pose import InitPose
+
+    if options.method not in MATCHERS:
+        raise UsageError(f"--method {options.method}: there is no such method; expected {', '.join(MATCHERS)}")
+    verify = VerifyConfig(min_confidence=_probability(options.min_confidence))
+    return {
+        "init_poses": tuple(InitPose.parse(text) for text in options.init_pose),
+        "use_tf": options.use_tf,
+        "merge": MergeConfig(method=options.method, scale=options.scale, verify=verify),
+    }
+
+
+def _probability(text: str) -> float:
+    try:
+        probability = float(text)
+    except ValueError:
+        probability = math.nan
+    if not 0.0 < probability < 1.0:
+        raise UsageError(f"--min-confidence {text}: expected a probability between 0 and 1, such as 0.999")
+    return probability
 
 
 def _robots(text: str | None) -> tuple[str, ...] | None:

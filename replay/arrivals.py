@@ -14,27 +14,29 @@ from dataclasses import dataclass, field, replace
 from mapmerge.grid import Grid
 from replay.assemble import assemble
 from replay.clocks import stamp_ns
-from replay.codec import decode
+from replay.codec import decode, decode_transforms
 from replay.errors import BadMessage
 from replay.events import Clock, SkipCause, Skipped
-from replay.messages import GridMessage, UpdateMessage
-from replay.sources.base import RawMessage, Source
+from replay.messages import GridMessage, TransformMessage, UpdateMessage
+from replay.sources.base import TF_TYPES, RawMessage, Source
+
+Content = GridMessage | UpdateMessage | TransformMessage | Skipped
 
 
 @dataclass(frozen=True, slots=True)
 class Feed:
-    """What is read from one recording.
+    """What is read from one recording: maps, or transforms.
 
     Parameters
     ----------
     robot_of
-        Robot of each topic.
+        Robot of each topic; "" for transforms, which are no robot's own.
     clocks
         Clock of each topic.
     offsets_ns
         Added to each topic's times.
     untimed_ns
-        Time given to saved maps, which have none.
+        Time given to saved maps, which have none, and to transforms that hold always.
     """
 
     source: Source
@@ -48,7 +50,7 @@ class Feed:
 class Window:
     """Which times are used (``start_ns`` ≤ time < ``stop_ns``), and how far messages are put in order.
 
-    A robot's last map before ``start_ns`` is used as well: at ``start_ns``, it is what is known.
+    A robot's last map before ``start_ns`` is used as well: at ``start_ns``, it is what is known. So are transforms.
     """
 
     start_ns: int | None
@@ -76,14 +78,18 @@ class Arrival:
     """A message, or why it cannot be used, at the time at which it takes effect."""
 
     stamp_ns: int
-    robot: str
-    input: str
+    feed: Feed
     raw: RawMessage
-    content: GridMessage | UpdateMessage | Skipped
+    content: Content
+
+    @property
+    def robot(self) -> str:
+        """Whose map it is; "" if it is none."""
+        return self.feed.robot_of[self.raw.topic]
 
     def skipped(self, error: BadMessage) -> Skipped:
-        """Return why the message is not used after all."""
-        return _skipped(self.robot, self.input, self.raw, error)
+        """Return why the message, or a part of it, is not used after all."""
+        return _skipped(self.feed, self.raw, error)
 
 
 def in_order(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
@@ -110,30 +116,29 @@ def in_order(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
 
 def _stamped(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
     """Decode a recording's messages and give each its time on the reference's clock."""
-    name = feed.source.path.name
     times = _Times(feed, tally)
     before = _Before()
     for raw in feed.source.messages(tuple(feed.robot_of)):
-        robot = feed.robot_of[raw.topic]
-        content = _decoded(robot, name, raw)
+        content = _decoded(feed, raw)
         time_ns = times.of(raw, content)
         early = window.start_ns is not None and time_ns < window.start_ns
-        if early and not isinstance(content, Skipped):
+        if early and isinstance(content, GridMessage | UpdateMessage):
             tally.count(raw)
-            before.take(Arrival(time_ns, robot, name, raw, content))
-        if early or (window.stop_ns is not None and time_ns >= window.stop_ns):
+            before.take(Arrival(time_ns, feed, raw, content), content)
+        unwanted = early and not isinstance(content, TransformMessage)
+        if unwanted or (window.stop_ns is not None and time_ns >= window.stop_ns):
             continue
         yield from before.release(window.start_ns)
         tally.count(raw)
-        yield Arrival(time_ns, robot, name, raw, content)
+        yield Arrival(time_ns, feed, raw, content)
     yield from before.release(window.start_ns)
 
 
-def _decoded(robot: str, name: str, raw: RawMessage) -> GridMessage | UpdateMessage | Skipped:
+def _decoded(feed: Feed, raw: RawMessage) -> Content:
     try:
-        return decode(raw)
+        return decode_transforms(raw) if raw.msgtype in TF_TYPES else decode(raw)
     except BadMessage as error:
-        return _skipped(robot, name, raw, error)
+        return _skipped(feed, raw, error)
 
 
 class _Times:
@@ -149,12 +154,14 @@ class _Times:
         self._leads_ns: dict[str, int] = {}
         self._newest_ns = feed.untimed_ns
 
-    def of(self, raw: RawMessage, content: GridMessage | UpdateMessage | Skipped) -> int:
+    def of(self, raw: RawMessage, content: Content) -> int:
         """Return the time of a message."""
         clock = self._feed.clocks[raw.topic]
         if clock == "none":
             return self._feed.untimed_ns
-        if isinstance(content, Skipped) or (clock == "header" and content.stamp_ns <= 0):
+        if isinstance(content, TransformMessage) and content.stamp_ns <= 0:
+            time_ns = max(0, raw.log_time_ns + self._feed.offsets_ns[raw.topic])
+        elif isinstance(content, Skipped) or (clock == "header" and content.stamp_ns <= 0):
             time_ns = self._guessed(raw)
         else:
             time_ns = max(0, stamp_ns(clock, raw, content) + self._feed.offsets_ns[raw.topic])
@@ -175,16 +182,14 @@ class _Before:
     def __init__(self) -> None:
         self._last: dict[str, tuple[Arrival, Grid]] = {}
 
-    def take(self, arrival: Arrival) -> None:
+    def take(self, arrival: Arrival, content: GridMessage | UpdateMessage) -> None:
         """Keep a map, or an update of the one that is kept; what cannot be used is left out, as all of that time is."""
-        if isinstance(arrival.content, Skipped):
-            return
         kept = self._last.get(arrival.robot)
         older = kept is not None and arrival.stamp_ns < kept[0].stamp_ns
-        if older and isinstance(arrival.content, GridMessage):
+        if older and isinstance(content, GridMessage):
             return
         try:
-            grid = assemble(kept[1] if kept else None, arrival.content)
+            grid = assemble(kept[1] if kept else None, content)
         except BadMessage:
             return
         self._last[arrival.robot] = arrival, grid
@@ -196,5 +201,6 @@ class _Before:
         self._last.clear()
 
 
-def _skipped(robot: str, name: str, raw: RawMessage, error: BadMessage) -> Skipped:
-    return Skipped(robot, raw.topic, raw.log_time_ns, SkipCause(error.cause), error.detail, name)
+def _skipped(feed: Feed, raw: RawMessage, error: BadMessage) -> Skipped:
+    robot, cause = feed.robot_of[raw.topic], SkipCause(error.cause)
+    return Skipped(robot, raw.topic, raw.log_time_ns, cause, error.detail, feed.source.path.name)

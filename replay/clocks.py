@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from replay.codec import decode
 from replay.errors import BadMessage, UsageError
 from replay.events import Clock
-from replay.messages import GridMessage, UpdateMessage
+from replay.messages import GridMessage, TransformMessage, UpdateMessage
 from replay.options import NS_PER_S, ClockChoice
 from replay.sources.base import RawMessage, Source
 
@@ -68,7 +68,7 @@ def probe(source: Source, index: int, robot: str, topic: str, choice: ClockChoic
     return None
 
 
-def stamp_ns(clock: Clock, raw: RawMessage, message: GridMessage | UpdateMessage) -> int:
+def stamp_ns(clock: Clock, raw: RawMessage, message: GridMessage | UpdateMessage | TransformMessage) -> int:
     """Return the time of a message by this clock."""
     return message.stamp_ns if clock == "header" else raw.log_time_ns
 

@@ -33,6 +33,8 @@ class SkipCause(StrEnum):
     """An update of a part, before any full map."""
     UPDATE_OUTSIDE_GRID = "update_outside_grid"
     """An update of a part that is not within the last full map."""
+    BAD_TRANSFORM = "bad_transform"
+    """A transform in it has no finite shift, no rotation, or not two frames; the others in it are used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +76,15 @@ class Started:
 
 @dataclass(frozen=True, slots=True)
 class Skipped:
-    """A message could not be used; ``input`` is the name of the file or folder that it came from."""
+    """A message could not be used, or not all of it.
+
+    Parameters
+    ----------
+    robot
+        Whose it is; "" for transforms, which are no robot's own.
+    input
+        Name of the file or folder that it came from.
+    """
 
     robot: str
     topic: str
@@ -82,6 +92,14 @@ class Skipped:
     cause: SkipCause
     detail: str
     input: str
+
+
+@dataclass(frozen=True, slots=True)
+class Noted:
+    """Something a reader should know of a robot, in words; nothing failed."""
+
+    robot: str
+    message: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,4 +152,4 @@ class Finished:
     report: Report
 
 
-Event = Started | Skipped | Merged | Finished
+Event = Started | Skipped | Noted | Merged | Finished

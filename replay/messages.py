@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mapmerge.grid import Cells, Grid
+from replay.pose3 import Pose3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,3 +44,31 @@ class UpdateMessage:
     col: int
     row: int
     cells: Cells
+
+
+@dataclass(frozen=True, slots=True)
+class FrameLink:
+    """A transform between two frames, whose names have no leading slash."""
+
+    parent: str
+    child: str
+    parent_from_child: Pose3
+
+
+@dataclass(frozen=True, slots=True)
+class TransformMessage:
+    """A ``tf2_msgs/TFMessage``.
+
+    Parameters
+    ----------
+    stamp_ns
+        The newest stamp of its transforms; 0 if none was set.
+    links
+        The transforms that can be used.
+    bad
+        What is wrong with each of the others.
+    """
+
+    stamp_ns: int
+    links: tuple[FrameLink, ...]
+    bad: tuple[str, ...]

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from mapmerge.config import MergeConfig
 from replay.errors import UsageError
+from replay.init_pose import InitPose
 from replay.runs import RunPath, TopicChoice
 
 NS_PER_S = 1_000_000_000
@@ -89,6 +90,10 @@ class RunOptions:
         Whether a message that cannot be used ends the run.
     images
         Which intermediate images are rendered.
+    init_poses
+        Where robots' maps are said to lie in the reference's map frame.
+    use_tf
+        Whether recorded transforms between map frames say so, for robots without such a pose.
     merge
         Settings of the merger.
     """
@@ -103,6 +108,8 @@ class RunOptions:
     align_starts: bool = False
     strict: bool = False
     images: ImageChoice = "changed"
+    init_poses: tuple[InitPose, ...] = ()
+    use_tf: bool = False
     merge: MergeConfig = field(default_factory=MergeConfig)
 
     def settings(self) -> Mapping[str, Any]:
@@ -114,6 +121,8 @@ class RunOptions:
             "reorder_window_ns": self.reorder_window_ns,
             "align_starts": self.align_starts,
             "topics": [asdict(choice) for choice in self.topics],
+            "init_poses": [asdict(item) for item in self.init_poses],
+            "use_tf": self.use_tf,
             "merge": _plain(asdict(self.merge)),
         }
 

@@ -9,14 +9,15 @@ from mapmerge.errors import MapMergeError
 from mapmerge.merger import MergeState, step
 from replay import __version__
 from replay.arrivals import Tally
+from replay.beliefs import Beliefs
 from replay.errors import InputError
-from replay.events import Event, Finished, Merged, Skipped, Started, Timing
+from replay.events import Event, Finished, Merged, Noted, Skipped, Started, Timing
 from replay.gallery import Gallery
 from replay.options import RunOptions
 from replay.plan import Plan, open_plan
 from replay.report import ReportBuilder
 from replay.sinks.base import Sink
-from replay.timeline import ticks
+from replay.timeline import Transforms, ticks
 
 
 def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
@@ -24,29 +25,44 @@ def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
     settings = options.settings()
     report = ReportBuilder(plan.robots, settings, __version__)
     gallery = Gallery(options.images)
-    tallies = tuple(Tally() for _ in plan.feeds)
+    beliefs = Beliefs(plan.map_frames, options.init_poses, plan.recordings_with_transforms())
+    feeds = (*plan.feeds, *(plan.transform_feeds or ()))
+    tallies = tuple(Tally() for _ in feeds)
     inputs = plan.describe_inputs()
     state = MergeState.initial([item.robot for item in plan.robots])
     done, total, stamp_ns = 0, sum(item.message_count for item in plan.robots), None
 
     yield Started(plan.robots, settings, inputs)
-    for tick in ticks(plan.feeds, tallies, plan.window, strict=options.strict):
+    yield from _noted(report, beliefs.foreseen())
+    for tick in ticks(feeds, tallies, plan.window, strict=options.strict):
+        if isinstance(tick, Transforms):
+            beliefs.take(tick)
+            continue
         if isinstance(tick, Skipped):
             report.skip(tick)
             yield tick
             continue
+        priors, notes = beliefs.now()
+        yield from _noted(report, notes)
         begin = perf_counter()
         try:
-            state, result = step(state, tick.grids, options.merge)
+            state, result = step(state, tick.grids, options.merge, priors)
         except MapMergeError as error:
             raise InputError(f"the maps of {', '.join(tick.grids)} at {tick.stamp_ns} ns: {error}") from error
         merged = perf_counter()
         pictures = gallery.due(result)
         timing = Timing(merged - begin, perf_counter() - merged)
-        report.take(tick.stamp_ns, result)
+        report.take(tick.stamp_ns, result, priors)
         done, stamp_ns = done + tick.messages, tick.stamp_ns
         yield Merged(stamp_ns, result, report.build(stamp_ns, result, inputs), pictures, timing, done, total)
+    yield from _noted(report, beliefs.missed())
     yield Finished(report.build(stamp_ns, state.result, plan.describe_inputs(tallies)))
+
+
+def _noted(report: ReportBuilder, notes: Iterable[Noted]) -> Iterator[Noted]:
+    for note in notes:
+        report.note(note)
+        yield note
 
 
 def merge(options: RunOptions) -> Iterator[Event]:

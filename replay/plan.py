@@ -12,10 +12,12 @@ from replay.arrivals import Feed, Tally, Window
 from replay.clocks import Probe, agreed, frames, offsets_ns, probe, refuse_recorded_twice
 from replay.errors import UsageError
 from replay.events import Clock, RobotInput
+from replay.init_pose import InitPose
 from replay.options import NS_PER_S, RunOptions
 from replay.selection import Selected, select
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
+from replay.transform_feeds import transform_feeds
 
 MERGED_FRAME = "merged"
 
@@ -34,12 +36,24 @@ class Plan:
         What is read from each input.
     window
         Which times are used.
+    map_frames
+        Each robot's map frame as recorded, its leading slash stripped; "" where that is not known.
+    transform_feeds
+        Which transforms are read; None if none are to be used.
     """
 
     infos: tuple[SourceInfo, ...]
     robots: tuple[RobotInput, ...]
     feeds: tuple[Feed, ...]
     window: Window
+    map_frames: Mapping[str, str]
+    transform_feeds: tuple[Feed, ...] | None
+
+    def recordings_with_transforms(self) -> list[Source] | None:
+        """Return the recordings whose transforms are read; None if none are to be used."""
+        if self.transform_feeds is None:
+            return None
+        return list(dict.fromkeys(feed.source for feed in self.transform_feeds))
 
     def unused_topics(self) -> list[str]:
         """Return the map topics with messages that are no robot's in this run, in order of name."""
@@ -49,7 +63,15 @@ class Plan:
         return sorted(there - used - empty)
 
     def describe_inputs(self, tallies: tuple[Tally, ...] | None = None) -> tuple[Mapping[str, Any], ...]:
-        """Return what is said of the inputs in reports; counts and digests only once all was read."""
+        """Return what is said of the inputs in reports; counts and digests only once all was read.
+
+        Parameters
+        ----------
+        tallies
+            Of the feeds and then of the feeds of transforms.
+        """
+        read = tallies or (None,) * (len(self.feeds) + len(self.transform_feeds or ()))
+        transforms = list(zip(self.transform_feeds or (), read[len(self.feeds) :], strict=True))
         return tuple(
             {
                 "name": feed.source.path.name,
@@ -58,12 +80,24 @@ class Plan:
                 "robots": sorted(set(feed.robot_of.values())),
                 "clocks": dict(sorted(feed.clocks.items())),
                 "offsets_ns": dict(sorted(feed.offsets_ns.items())),
-                "messages": tally.messages if tally else None,
+                **_read(tally),
                 "late": tally.late if tally else None,
-                "sha256": tally.digest.hexdigest() if tally else None,
+                "transforms": {
+                    topic: _read(taken)
+                    for each, taken in transforms
+                    if each.source is feed.source
+                    for topic in each.robot_of
+                },
             }
-            for feed, info, tally in zip(self.feeds, self.infos, tallies or (None,) * len(self.feeds), strict=True)
+            for feed, info, tally in zip(self.feeds, self.infos, read, strict=False)
         )
+
+
+def _read(tally: Tally | None) -> dict[str, Any]:
+    return {
+        "messages": tally.messages if tally else None,
+        "sha256": tally.digest.hexdigest() if tally else None,
+    }
 
 
 @contextmanager
@@ -85,6 +119,7 @@ def open_plan(options: RunOptions) -> Iterator[Plan]:
 def _plan(sources: list[Source], options: RunOptions) -> Plan:
     infos = tuple(source.info for source in sources)
     selected = select(options.runs, infos, robots=options.robots, topics=options.topics)
+    _refuse_unfit_poses([item.robot for item in selected], options.init_poses)
     probes = agreed(_probes(sources, infos, selected, options))
     refuse_recorded_twice(probes, [run.path.name for run in options.runs], options.reorder_window_ns)
     offsets = offsets_ns(selected[0].robot, probes, align_starts=options.align_starts)
@@ -95,14 +130,34 @@ def _plan(sources: list[Source], options: RunOptions) -> Plan:
         options.reorder_window_ns,
     )
     _refuse_empty(window, start_ns, stop_ns)
+    untimed_ns = start_ns if window.start_ns is None else max(start_ns, window.start_ns)
+    frame_ids = _frame_ids(probes)
     return Plan(
         infos,
-        _robots(selected, probes, infos),
-        _feeds(
-            sources, selected, probes, offsets, start_ns if window.start_ns is None else max(start_ns, window.start_ns)
-        ),
+        _robots(selected, probes, infos, frame_ids),
+        _feeds(sources, selected, probes, offsets, untimed_ns),
         window,
+        {item.robot: frame_ids.get(item.robot, "").lstrip("/") for item in selected},
+        transform_feeds(sources, probes, offsets, options.clock) if options.use_tf else None,
     )
+
+
+def _refuse_unfit_poses(robots: list[str], poses: tuple[InitPose, ...]) -> None:
+    """Refuse poses of robots that there are not, two poses of one robot, and one of the reference."""
+    reference, *others = robots
+    taken: set[str] = set()
+    for item in poses:
+        if item.robot == reference:
+            raise UsageError(
+                f"--init-pose {item.robot}: {reference} is the reference, whose map frame is the merged frame; give "
+                "poses of the other robots, or another reference, first in --robots"
+            )
+        if item.robot not in others:
+            there = ", ".join(others) or f"none but the reference {reference}"
+            raise UsageError(f"--init-pose {item.robot}: no such robot is merged; there are: {there}")
+        if item.robot in taken:
+            raise UsageError(f"--init-pose {item.robot}: given twice; give one pose for each robot")
+        taken.add(item.robot)
 
 
 def _refuse_empty(window: Window, start_ns: int, stop_ns: int) -> None:
@@ -143,13 +198,21 @@ def _span_ns(probes: list[Probe], offsets: Mapping[tuple[int, str], int]) -> tup
     return min(first, default=0), max(last, default=0)
 
 
-def _robots(
-    selected: tuple[Selected, ...], probes: list[Probe], infos: tuple[SourceInfo, ...]
-) -> tuple[RobotInput, ...]:
+def _frame_ids(probes: list[Probe]) -> dict[str, str]:
     frame_ids: dict[str, str] = {}
-    clocks: dict[str, Clock] = {}
     for item in probes:
         frame_ids.setdefault(item.robot, item.frame_id)
+    return frame_ids
+
+
+def _robots(
+    selected: tuple[Selected, ...],
+    probes: list[Probe],
+    infos: tuple[SourceInfo, ...],
+    frame_ids: Mapping[str, str],
+) -> tuple[RobotInput, ...]:
+    clocks: dict[str, Clock] = {}
+    for item in probes:
         clocks.setdefault(item.robot, item.clock)
     named = frames([item.robot for item in selected], frame_ids, MERGED_FRAME)
     return tuple(

@@ -15,9 +15,10 @@ from mapmerge.fuse import Agreement
 from mapmerge.match import Match
 from mapmerge.merger import MergeResult
 from mapmerge.outcome import ChangeKind, Pair, RobotOutcome
+from mapmerge.prior import Prior
 from mapmerge.reasons import Reason
 from mapmerge.sim2 import Sim2, wrap_angle
-from replay.events import Report, RobotInput, Skipped
+from replay.events import Noted, Report, RobotInput, Skipped
 
 SCHEMA = "replay.report/1"
 _DIGITS = 6
@@ -47,13 +48,20 @@ class ReportBuilder:
         self._skipped: Counter[str] = Counter()
         self._first_merged_ns: dict[str, int] = {}
         self._history: list[Json] = []
+        self._notes: list[Json] = []
+        self._priors: Mapping[str, Prior] = {}
 
     def skip(self, event: Skipped) -> None:
         """Count a message that was not used."""
         self._skipped[event.cause] += 1
 
-    def take(self, stamp_ns: int, result: MergeResult) -> None:
-        """Take in what a tick brought."""
+    def note(self, event: Noted) -> None:
+        """Keep what a reader should know."""
+        self._notes.append({"robot": event.robot, "message": event.message})
+
+    def take(self, stamp_ns: int, result: MergeResult, priors: Mapping[str, Prior] | None = None) -> None:
+        """Take in what a tick brought, and what was believed of the robots' places before it."""
+        self._priors = priors or {}
         self._updates.update(result.updated)
         for change in result.changes:
             if change.kind is ChangeKind.PLACED:
@@ -75,8 +83,9 @@ class ReportBuilder:
             "stamp_ns": stamp_ns,
             "reference": self._robots[0].robot,
             "robots": {item.robot: self._robot(item, result.robots[item.robot]) for item in self._robots},
-            "pairs": [_pair(pair, match) for pair, match in result.pairs.items()],
+            "pairs": [_pair(pair, match, result.priors.get(pair)) for pair, match in result.pairs.items()],
             "history": list(self._history),
+            "notes": list(self._notes),
             "updates": self._updates.total(),
             "skipped": dict(sorted(self._skipped.items())),
             "inputs": [dict(item) for item in inputs],
@@ -90,7 +99,8 @@ class ReportBuilder:
             "reason": _reason(outcome.reason),
             "merged_from_map": _pose(outcome.merged_from_map),
             **_agreement(outcome.agreement),
-            "confidence": None,
+            "confidence": _share(outcome.confidence),
+            "prior": _prior(self._priors.get(item.robot)),
             "component": placement.component if placement else None,
             "component_from_map": _pose(placement.component_from_map) if placement else None,
             "placed_via": placement.via if placement else None,
@@ -116,6 +126,20 @@ def _pose(pose: Sim2 | None) -> Json | None:
     }
 
 
+def _prior(prior: Prior | None) -> Json | None:
+    if prior is None:
+        return None
+    return {
+        "pose": _pose(prior.target_from_source),
+        "sigma": {
+            "x_m": _round(prior.sigma_x_m),
+            "y_m": _round(prior.sigma_y_m),
+            "yaw_rad": _round(prior.sigma_yaw_rad),
+        },
+        "origin": prior.origin,
+    }
+
+
 def _agreement(agreement: Agreement | None) -> Json:
     if agreement is None:
         return {"acceptance": None, "overlap_m2": None, "overlap_fraction": None}
@@ -126,7 +150,7 @@ def _agreement(agreement: Agreement | None) -> Json:
     }
 
 
-def _pair(pair: Pair, match: Match) -> Json:
+def _pair(pair: Pair, match: Match, prior: Prior | None) -> Json:
     scores = match.scores
     return {
         "a": pair[0],
@@ -134,11 +158,17 @@ def _pair(pair: Pair, match: Match) -> Json:
         "a_from_b": _pose(match.target_from_source),
         "scores": {name: _round(value) for name, value in asdict(scores).items()} if scores else None,
         "accepted": match.accepted,
+        "confidence": _share(match.confidence),
         "reason": _reason(match.reason),
+        "prior": _prior(prior),
         "rivals": [
             {"a_from_b": _pose(rival.target_from_source), "score_m": _round(rival.score_m)} for rival in match.rivals
         ],
     }
+
+
+def _share(value: float | None) -> float | None:
+    return None if value is None else _round(value)
 
 
 def _round(value: float) -> float:

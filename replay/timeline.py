@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -11,7 +11,9 @@ from mapmerge.grid import Grid
 from replay.arrivals import Arrival, Feed, Tally, Window, in_order
 from replay.assemble import assemble
 from replay.errors import BadMessage, InputError
-from replay.events import Skipped
+from replay.events import SkipCause, Skipped
+from replay.messages import FrameLink, TransformMessage
+from replay.sources.base import Source
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,8 +25,19 @@ class Tick:
     messages: int
 
 
-def ticks(feeds: Sequence[Feed], tallies: Sequence[Tally], window: Window, *, strict: bool) -> Iterator[Tick | Skipped]:
-    """Yield what the recordings say, in order of time.
+@dataclass(frozen=True, slots=True, eq=False)
+class Transforms:
+    """Transforms of one recording that hold from this time on; ``stamp_ns`` is None if they hold always."""
+
+    recording: Source
+    stamp_ns: int | None
+    links: tuple[FrameLink, ...]
+
+
+def ticks(
+    feeds: Sequence[Feed], tallies: Sequence[Tally], window: Window, *, strict: bool
+) -> Iterator[Tick | Skipped | Transforms]:
+    """Yield what the recordings say, in order of time; of one time, transforms before the tick.
 
     Parameters
     ----------
@@ -43,15 +56,15 @@ def ticks(feeds: Sequence[Feed], tallies: Sequence[Tally], window: Window, *, st
     messages = 0
     for time_ns, arrivals in groupby(heapq.merge(*streams, key=_stamp), key=_stamp):
         changed: dict[str, Grid] = {}
-        for skipped in _take(arrivals, latest, changed):
-            if skipped is not None:
-                if strict:
+        for arrival in arrivals:
+            for item in _taken(arrival, latest, changed):
+                if strict and isinstance(item, Skipped):
                     raise InputError(
-                        f"{skipped.input}: {skipped.topic} at {skipped.log_time_ns} ns: {skipped.detail}; "
+                        f"{item.input}: {item.topic} at {item.log_time_ns} ns: {item.detail}; "
                         "without --strict it would be skipped and counted"
                     )
-                yield skipped
-            messages += 1
+                yield item
+            messages += arrival.robot != ""
         if changed:
             yield Tick(time_ns, changed, messages)
             messages = 0
@@ -61,16 +74,20 @@ def _stamp(arrival: Arrival) -> int:
     return arrival.stamp_ns
 
 
-def _take(arrivals: Iterable[Arrival], latest: dict[str, Grid], changed: dict[str, Grid]) -> Iterator[Skipped | None]:
-    """Apply messages of one time to the latest maps; yield for each None or why it was not used."""
-    for arrival in arrivals:
-        if isinstance(arrival.content, Skipped):
-            yield arrival.content
-            continue
+def _taken(arrival: Arrival, latest: dict[str, Grid], changed: dict[str, Grid]) -> Iterator[Skipped | Transforms]:
+    """Apply a message to the latest maps; yield its transforms, or why it was not used."""
+    content = arrival.content
+    if isinstance(content, Skipped):
+        yield content
+    elif isinstance(content, TransformMessage):
+        if content.bad:
+            yield arrival.skipped(BadMessage(SkipCause.BAD_TRANSFORM, "; ".join(content.bad)))
+        always = arrival.feed.clocks[arrival.raw.topic] == "none"
+        yield Transforms(arrival.feed.source, None if always else arrival.stamp_ns, content.links)
+    else:
         try:
-            latest[arrival.robot] = assemble(latest.get(arrival.robot), arrival.content)
+            latest[arrival.robot] = assemble(latest.get(arrival.robot), content)
         except BadMessage as error:
             yield arrival.skipped(error)
-            continue
+            return
         changed[arrival.robot] = latest[arrival.robot]
-        yield None

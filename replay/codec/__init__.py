@@ -1,9 +1,9 @@
-"""Messages as bytes ↔ messages as values: the only place that knows how ROS serialises a map."""
+"""Messages as bytes ↔ messages as values: the only place that knows how ROS serialises them."""
 
 from replay.codec.decode import decode
+from replay.codec.decode_transforms import decode_transforms
 from replay.codec.encode import (
     IMAGE_TYPE,
-    TF_TYPE,
     FrameTransform,
     encode_grid,
     encode_image,
@@ -13,9 +13,9 @@ from replay.codec.typestores import ros1_typestore, ros2_message_definition, ros
 
 __all__ = [
     "IMAGE_TYPE",
-    "TF_TYPE",
     "FrameTransform",
     "decode",
+    "decode_transforms",
     "encode_grid",
     "encode_image",
     "encode_transforms",

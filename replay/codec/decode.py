@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import math
-import struct
 from typing import TYPE_CHECKING, Protocol, cast
 
 import numpy as np
 
 from mapmerge.grid import MAX_SIDE_CELLS, UNKNOWN, Cells, Grid
 from mapmerge.sim2 import Sim2
-from replay.codec.typestores import ros1_typestore, ros2_typestore
+from replay.codec.deserialize import deserialized, header_stamp_ns
 from replay.errors import BadMessage
 from replay.messages import GridMessage, UpdateMessage
+from replay.pose3 import MAX_TILT_RAD, Pose3
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, RawMessage
 
 if TYPE_CHECKING:
     from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Pose as Pose
     from rosbags.typesys.stores.ros2_jazzy import nav_msgs__msg__OccupancyGrid as OccupancyGrid
     from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Header as Header
-
-MAX_TILT_RAD = math.radians(5.0)
-
-_NS = 1_000_000_000
 
 
 class _OccupancyGridUpdate(Protocol):
@@ -54,28 +50,12 @@ def decode(raw: RawMessage) -> GridMessage | UpdateMessage:
         - ``bad_resolution``: it is no positive number;
         - ``bad_origin``: it is not finite, or not flat.
     """
-    message = _deserialized(raw)
+    if raw.msgtype not in {GRID_TYPE, UPDATE_TYPE}:
+        raise BadMessage("undecodable", f"{raw.msgtype} is no map; {GRID_TYPE} or {UPDATE_TYPE} was expected")
+    message = deserialized(raw, raw.msgtype)
     if raw.msgtype == UPDATE_TYPE:
         return _update(cast("_OccupancyGridUpdate", message))
     return _grid(cast("OccupancyGrid", message))
-
-
-def _deserialized(raw: RawMessage) -> object:
-    from rosbags.serde import SerdeError
-
-    if raw.msgtype not in {GRID_TYPE, UPDATE_TYPE}:
-        raise BadMessage("undecodable", f"{raw.msgtype} is no map; {GRID_TYPE} or {UPDATE_TYPE} was expected")
-    # Given bytes, rosbags copies all of them to take off the first four.
-    data = memoryview(raw.data)
-    try:
-        if raw.encoding == "ros1":
-            return ros1_typestore().deserialize_ros1(data, raw.msgtype)
-        return ros2_typestore().deserialize_cdr(data, raw.msgtype)
-    except (SerdeError, struct.error, ValueError, LookupError, AssertionError, TypeError, OverflowError) as error:
-        found = " ".join(str(error).split()) or type(error).__name__
-        raise BadMessage(
-            "undecodable", f"{len(raw.data)} bytes are no {raw.encoding} {raw.msgtype}: {found}"
-        ) from error
 
 
 def _grid(message: OccupancyGrid) -> GridMessage:
@@ -84,7 +64,7 @@ def _grid(message: OccupancyGrid) -> GridMessage:
     if not (math.isfinite(info.resolution) and info.resolution > 0.0):
         raise BadMessage("bad_resolution", f"the resolution is {info.resolution} m; a positive number was expected")
     grid = Grid(cells, _shortest(info.resolution), _flat_pose(info.origin))
-    return GridMessage(_stamp_ns(message.header), message.header.frame_id, grid)
+    return GridMessage(header_stamp_ns(message.header), message.header.frame_id, grid)
 
 
 def _shortest(single: float) -> float:
@@ -94,11 +74,7 @@ def _shortest(single: float) -> float:
 
 def _update(message: _OccupancyGridUpdate) -> UpdateMessage:
     cells = _cells(message.data, message.width, message.height)
-    return UpdateMessage(_stamp_ns(message.header), message.header.frame_id, message.x, message.y, cells)
-
-
-def _stamp_ns(header: Header) -> int:
-    return header.stamp.sec * _NS + header.stamp.nanosec
+    return UpdateMessage(header_stamp_ns(message.header), message.header.frame_id, message.x, message.y, cells)
 
 
 def _cells(data: Cells, width: int, height: int) -> Cells:
@@ -125,20 +101,18 @@ def _flat_pose(pose: Pose) -> Sim2:
     did not set it. Any other is normalised.
     """
     position, turn = pose.position, pose.orientation
-    if not all(map(math.isfinite, (position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w))):
-        raise BadMessage("bad_origin", f"the origin is {_text(pose)}; finite numbers were expected")
-    norm = math.hypot(turn.x, turn.y, turn.z, turn.w)
-    if norm == 0.0:
-        return Sim2(position.x, position.y)
-    x, y, z, w = turn.x / norm, turn.y / norm, turn.z / norm, turn.w / norm
-    # The angle between the map's z axis and that of its grid; hypot(x, y) is the sine of half of it.
-    tilt_rad = 2.0 * math.asin(min(1.0, math.hypot(x, y)))
-    if tilt_rad > MAX_TILT_RAD:
+    quaternion = (turn.x, turn.y, turn.z, turn.w)
+    try:
+        unset = quaternion == (0.0, 0.0, 0.0, 0.0)
+        placed = Pose3.of((position.x, position.y, position.z), (0.0, 0.0, 0.0, 1.0) if unset else quaternion)
+    except ValueError as error:
+        raise BadMessage("bad_origin", f"the origin is {_text(pose)}; {error}") from None
+    if placed.tilt_rad > MAX_TILT_RAD:
         raise BadMessage(
             "bad_origin",
-            f"the origin is tilted by {math.degrees(tilt_rad):.0f}°: {_text(pose)}; a turn about z was expected",
+            f"the origin is tilted by {math.degrees(placed.tilt_rad):.0f}°: {_text(pose)}; a turn about z was expected",
         )
-    return Sim2(position.x, position.y, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    return placed.flat()
 
 
 def _text(pose: Pose) -> str:

@@ -14,9 +14,8 @@ from mapmerge.render import Rgb
 from mapmerge.sim2 import Sim2
 from replay.codec.typestores import ros2_typestore
 from replay.errors import OutputError
-from replay.sources.base import GRID_TYPE
+from replay.sources.base import GRID_TYPE, TF_TYPE
 
-TF_TYPE = "tf2_msgs/msg/TFMessage"
 IMAGE_TYPE = "sensor_msgs/msg/Image"
 
 _NS = 1_000_000_000

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING
 
-from replay.sources.base import UPDATE_TYPE
+from replay.sources.base import TF_TYPE, UPDATE_TYPE
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -42,7 +42,7 @@ def ros1_typestore() -> Typestore:
 
     store = get_typestore(Stores.ROS1_NOETIC)
     store.register(get_types_from_msg(_UPDATE_DEFINITION, UPDATE_TYPE))
-    store.register(get_types_from_msg(_TF_DEFINITION, "tf2_msgs/msg/TFMessage"))
+    store.register(get_types_from_msg(_TF_DEFINITION, TF_TYPE))
     return store
 
 

@@ -24,7 +24,6 @@ from mapmerge.merger import MergeResult
 from replay import __version__
 from replay.codec import (
     IMAGE_TYPE,
-    TF_TYPE,
     FrameTransform,
     encode_grid,
     encode_image,
@@ -36,7 +35,7 @@ from replay.options import OutputOptions
 from replay.plan import MERGED_FRAME
 from replay.sinks.partial_file import PartialFile, output_errors
 from replay.sinks.qos import LATCHED, VOLATILE
-from replay.sources.base import GRID_TYPE
+from replay.sources.base import GRID_TYPE, TF_TYPE
 
 MAP_TOPIC = "/merged/map"
 REPORT_TOPIC = "/merged/report"

@@ -10,7 +10,7 @@ from uuid import NAMESPACE_URL, UUID, uuid5
 import rerun as rr
 
 from mapmerge.config import CellConfig
-from replay.events import Event, Finished, Merged, Report, RobotPicture, Skipped, Started
+from replay.events import Event, Finished, Merged, Noted, Report, RobotPicture, Skipped, Started
 from replay.options import NS_PER_S, OutputOptions
 from replay.sinks import rerun_text as text
 from replay.sinks.partial_file import PartialFile, output_errors
@@ -68,7 +68,7 @@ class _Writer:
         self._maps = MapScene(self.stream, robots, CellConfig(**merge["cells"]))
         self._plots = Plots(self.stream, robots, merge["verify"]["min_acceptance"])
         self._steps: dict[str, list[str]] = {}
-        self._skipped: list[Skipped] = []
+        self._waiting: list[text.Entry] = []
         self._table = ""
         self._span: Span | None = None
 
@@ -77,7 +77,9 @@ class _Writer:
         match event:
             case Skipped():
                 # A message is skipped before its tick is there, and only that has the time of the recording.
-                self._skipped.append(event)
+                self._waiting.append(text.skipped(event))
+            case Noted():
+                self._waiting.append(text.noted(event))
             case Merged():
                 self._take_merged(event)
             case Finished():
@@ -95,14 +97,14 @@ class _Writer:
         for item in event.pictures:
             self._show_picture(item)
         self._plots.show(event.report, event.timing)
-        self._show_skipped()
+        self._say_waiting()
         for entry in text.decisions(event.result):
             self._say(entry)
         self._show_table(event.report)
         self.stream.flush()
 
     def _take_finished(self, event: Finished) -> None:
-        self._show_skipped()
+        self._say_waiting()
         for entry in text.outcome(event.report):
             self._say(entry)
         self._show_table(event.report)
@@ -120,10 +122,10 @@ class _Writer:
             self._table = table
             self.stream.log(ROBOTS, rr.TextDocument(table, media_type=_MARKDOWN), static=self._span is None)
 
-    def _show_skipped(self) -> None:
-        for event in self._skipped:
-            self._say(text.skipped(event))
-        self._skipped.clear()
+    def _say_waiting(self) -> None:
+        for entry in self._waiting:
+            self._say(entry)
+        self._waiting.clear()
 
     def _say(self, entry: text.Entry) -> None:
         level, words = entry

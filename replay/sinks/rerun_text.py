@@ -10,13 +10,13 @@ from typing import Any
 from mapmerge.merger import MergeResult
 from mapmerge.outcome import Change, ChangeKind
 from mapmerge.sim2 import Sim2
-from replay.events import Report, Skipped
+from replay.events import Noted, Report, Skipped
 
 INFO, WARN = "INFO", "WARN"
 Entry = tuple[str, str]
 """Level and text of an entry of the log."""
 
-_COLUMNS = ("robot", "status", "x, m", "y, m", "yaw, °", "acceptance", "overlap, m²", "reason")
+_COLUMNS = ("robot", "status", "x, m", "y, m", "yaw, °", "acceptance", "overlap, m²", "confidence", "reason")
 
 
 def decisions(result: MergeResult) -> Iterator[Entry]:
@@ -27,7 +27,13 @@ def decisions(result: MergeResult) -> Iterator[Entry]:
 
 def skipped(event: Skipped) -> Entry:
     """Say which message was not used, and why."""
-    return WARN, f"{event.robot}: a message of {event.topic} was skipped: {event.detail}"
+    whose = f"{event.robot}: " if event.robot else ""
+    return WARN, f"{whose}a message of {event.topic} was skipped: {event.detail}"
+
+
+def noted(event: Noted) -> Entry:
+    """Say what a reader should know."""
+    return WARN, f"{event.robot}: {event.message}"
 
 
 def outcome(report: Report) -> Iterator[Entry]:
@@ -75,6 +81,7 @@ def _row(robot: str, values: Mapping[str, Any]) -> tuple[str, ...]:
         _number(None if yaw_rad is None else math.degrees(yaw_rad), 1),
         _number(values["acceptance"], 3),
         _number(values["overlap_m2"], 1),
+        _number(values["confidence"], 4),
         _plain(values["reason"]["message"]),
     )
 

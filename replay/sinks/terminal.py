@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from replay.events import Event, Merged, Report, Skipped, Started
+from replay.events import Event, Merged, Noted, Report, Skipped, Started
 from replay.words import counted, intention, unused
 
 if TYPE_CHECKING:
@@ -89,6 +89,8 @@ class Narrator:
                 self._say(unused(self._unused))
         elif isinstance(event, Skipped):
             self._say_skipped(event)
+        elif isinstance(event, Noted):
+            self._say(f"{event.robot}: {event.message}")
         elif isinstance(event, Merged):
             self._merge_s += event.timing.merge_s
             self._render_s += event.timing.render_s
@@ -138,14 +140,15 @@ def open_console(*, stderr: bool = False) -> Console:
 
 
 def print_table(console: Console, report: Report) -> None:
-    """Print a row for each robot: status, pose, acceptance index, overlap, reason."""
+    """Print a row for each robot: status, pose, acceptance index, overlap, confidence where it is known, reason."""
     from rich.table import Table
     from rich.text import Text
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in ("robot", "status"):
         table.add_column(name, no_wrap=True)
-    for name in ("x / m", "y / m", "yaw / °", "acceptance", "overlap"):
+    known = any(row["confidence"] is not None for row in report["robots"].values())
+    for name in ("x / m", "y / m", "yaw / °", "acceptance", "overlap", *(["confidence"] if known else [])):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("reason", overflow="fold")
     for robot, row in report["robots"].items():
@@ -154,8 +157,9 @@ def print_table(console: Console, report: Report) -> None:
             Text(robot),
             Text(status, style=_STYLES[status]),
             *_pose(row["merged_from_map"]),
-            _figure(None if row["acceptance"] is None else math.floor(row["acceptance"] * 1000) / 1000, "{:.3f}"),
+            _share(row["acceptance"], 3),
             _figure(row["overlap_m2"], "{:.1f} m²"),
+            *([_share(row["confidence"], 4)] if known else []),
             Text(row["reason"]["message"]),
         )
     console.print(table)
@@ -165,6 +169,11 @@ def _pose(pose: dict[str, float] | None) -> tuple[str, str, str]:
     if pose is None:
         return "–", "–", "–"
     return f"{pose['x_m']:.2f}", f"{pose['y_m']:.2f}", f"{math.degrees(pose['yaw_rad']):.1f}"
+
+
+def _share(value: float | None, digits: int) -> str:
+    """Return a share rounded down, so that what is less than a limit, or than 1, reads like that."""
+    return "–" if value is None else f"{math.floor(value * 10**digits) / 10**digits:.{digits}f}"
 
 
 def _figure(value: Any, form: str) -> str:  # noqa: ANN401 - a JSON number or null

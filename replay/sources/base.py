@@ -12,6 +12,9 @@ Encoding = Literal["cdr", "ros1"]
 
 GRID_TYPE = "nav_msgs/msg/OccupancyGrid"
 UPDATE_TYPE = "map_msgs/msg/OccupancyGridUpdate"
+TF_TYPE = "tf2_msgs/msg/TFMessage"
+TF_TYPES = (TF_TYPE, "tf/msg/tfMessage")
+"""Types of transforms: that of ROS 2 and of ROS 1, and the one of ROS 1 before tf2."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,6 +42,8 @@ OF_A_PAIR = {
     ReasonCode.WALLS_DISAGREE,
     ReasonCode.LOW_ACCEPTANCE,
     ReasonCode.AMBIGUOUS,
+    ReasonCode.LOW_CONFIDENCE,
+    ReasonCode.PRIOR_CONTRADICTED,
 }
 
 

@@ -112,6 +112,7 @@ class TestInputs:
             "offsets_ns": {"/r1/map": 0, "/r2/map": 0},
             "messages": 6,
             "late": 0,
+            "transforms": {},
         }
 
     def test_the_digest_is_that_of_the_messages_used(self, replay: Program, tmp_path: Path) -> None:

@@ -23,14 +23,15 @@ class ScriptedMatcher:
         self.answers = {}
         self.prepared = []
         self.matched = []
+        self.priors = []
 
     def map_of(self, value, resolution_m=0.05):
         return Grid(np.full((20, 20), value, np.int8), resolution_m)
 
-    def fits(self, target, source, pose=IDENTITY, score_m=50.0):
+    def fits(self, target, source, pose=IDENTITY, score_m=50.0, confidence=None):
         """From now on, the map filled with ``source`` lies at ``pose`` on that filled with ``target``."""
         reason = Reason(ReasonCode.ACCEPTED, f"{source} fits {target}")
-        self.answers[target, source] = Match(pose, self.scores(score_m), accepted=True, reason=reason)
+        self.answers[target, source] = Match(pose, self.scores(score_m), True, reason, confidence)
 
     def misfits(self, target, source, score_m=5.0, code=ReasonCode.WALLS_DISAGREE):
         reason = Reason(code, f"{source} does not fit {target}")
@@ -50,6 +51,7 @@ class ScriptedMatcher:
         assert target[1] == source[1]
         pair = target[0], source[0]
         self.matched.append(pair)
+        self.priors.append(prior)
         nothing = Reason(ReasonCode.NO_CANDIDATE, f"nothing is known of {pair}")
         return self.answers.get(pair, Match(None, None, accepted=False, reason=nothing))
 

@@ -33,6 +33,7 @@ INPUT: Mapping[str, Any] = {
     "messages": None,
     "late": None,
     "sha256": None,
+    "transforms": {},
 }
 
 
