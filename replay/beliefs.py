@@ -16,7 +16,7 @@ from replay.transforms import Chain, TransformBuffer
 TF_SIGMA_M = 0.5
 TF_SIGMA_YAW_RAD = math.radians(5.0)
 
-_WITHOUT = "it is placed without a prior"
+_WITHOUT = "no prior is used for it"
 
 
 class Beliefs:
@@ -102,5 +102,5 @@ class Beliefs:
     def _tilt(self, robot: str, tilt_rad: float) -> str:
         return (
             f"the transform from its map frame {self._frames[robot]!r} to {self._frames[self._reference]!r} is tilted "
-            f"by {math.degrees(tilt_rad):.0f}°, so that it says nothing of the plane and is not used"
+            f"by {math.degrees(tilt_rad):.0f}°, no pose in the plane; {_WITHOUT} while it is"
         )

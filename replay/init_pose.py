@@ -63,9 +63,12 @@ class InitPose:
             )
 
     def __str__(self) -> str:
-        """Return it as it is typed."""
-        sigmas = f"±{self.sigma_x_m!r},±{self.sigma_y_m!r},±{self.sigma_yaw_rad!r}"
-        return f"{self.robot}={self.x_m!r},{self.y_m!r},{self.yaw_rad!r}{sigmas}"
+        """Return it as it is typed; a spread that is the default is left out."""
+        pose = f"{self.robot}={self.x_m!r},{self.y_m!r},{self.yaw_rad!r}"
+        sigmas = (self.sigma_x_m, self.sigma_y_m, self.sigma_yaw_rad)
+        if sigmas == (DEFAULT_SIGMA_M, DEFAULT_SIGMA_M, DEFAULT_SIGMA_YAW_RAD):
+            return pose
+        return f"{pose}±{self.sigma_x_m!r},±{self.sigma_y_m!r},±{self.sigma_yaw_rad!r}"
 
     @staticmethod
     def parse(text: str) -> InitPose:

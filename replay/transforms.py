@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from replay.messages import FrameLink
@@ -50,27 +49,30 @@ class TransformBuffer:
 
     def chain(self, target: str, source: str) -> Chain | None:
         """Return where the source frame lies in the target frame; None if no chain of links leads there."""
-        ancestors = dict(self._upwards(target))
-        for frame, frame_from_source in self._upwards(source):
+        ancestors = self._ancestors(target)
+        for frame, frame_from_source in self._ancestors(source).items():
             if frame in ancestors:
                 frame_from_target = ancestors[frame]
                 pose = frame_from_target.target_from_source.inverse() @ frame_from_source.target_from_source
                 return Chain(pose, _newer(frame_from_target.stamp_ns, frame_from_source.stamp_ns))
         return None
 
-    def _upwards(self, frame: str) -> Iterator[tuple[str, Chain]]:
-        """Yield a frame and its ancestors, nearest first, with where the frame lies in each; a loop is walked once."""
+    def _ancestors(self, frame: str) -> dict[str, Chain]:
+        """Return where a frame lies in itself and in each of its ancestors, nearest first.
+
+        Nothing if they go round in a loop: there are two ways between its frames, and no telling which is right.
+        """
+        found: dict[str, Chain] = {}
         chain = Chain(Pose3(), None)
-        seen: set[str] = set()
-        while frame not in seen:
-            seen.add(frame)
-            yield frame, chain
+        while frame not in found:
+            found[frame] = chain
             held = self._held.get(frame)
             if held is None:
-                return
+                return found
             frame = held.link.parent
             pose = held.link.parent_from_child @ chain.target_from_source
             chain = Chain(pose, _newer(chain.stamp_ns, held.stamp_ns))
+        return {}
 
 
 def _newer(one_ns: int | None, other_ns: int | None) -> int | None:

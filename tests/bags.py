@@ -25,7 +25,7 @@ from rosbags.rosbag2 import Writer as Rosbag2Writer
 from mapmerge.grid import Grid
 from mapmerge.sim2 import Sim2
 from replay.codec import ros1_typestore, ros2_typestore
-from replay.sources.base import GRID_TYPE, UPDATE_TYPE
+from replay.sources.base import GRID_TYPE, TF_TYPE, TF_TYPES, UPDATE_TYPE
 
 TEXT_TYPE = "std_msgs/msg/String"
 SECOND = 1_000_000_000
@@ -110,12 +110,17 @@ def in_order(messages: Iterable[Recorded], topics: Iterable[str]) -> list[Record
 
 def as_cdr(message: Recorded) -> bytes:
     store = ros2_typestore()
-    return _cut(bytes(store.serialize_cdr(_message(store, message, ros1=False), message.msgtype)), message)
+    return _cut(bytes(store.serialize_cdr(_message(store, message, ros1=False), _known(message.msgtype))), message)
 
 
 def as_ros1(message: Recorded) -> bytes:
     store = ros1_typestore()
-    return _cut(bytes(store.serialize_ros1(_message(store, message, ros1=True), message.msgtype)), message)
+    return _cut(bytes(store.serialize_ros1(_message(store, message, ros1=True), _known(message.msgtype))), message)
+
+
+def _known(msgtype: str) -> str:
+    """Return the type that a typestore has for it."""
+    return TF_TYPE if msgtype in TF_TYPES else msgtype
 
 
 def _cut(data: bytes, message: Recorded) -> bytes:
@@ -127,8 +132,10 @@ def _message(store: Any, message: Recorded, *, ros1: bool) -> Any:
     if message.msgtype == TEXT_TYPE:
         return types[TEXT_TYPE](data=fields["data"])
     time = types["builtin_interfaces/msg/Time"]
-    sec, nanosec = divmod(fields["stamp_ns"], SECOND)
     extra = {"seq": 5} if ros1 else {}
+    if message.msgtype in TF_TYPES:
+        return types[TF_TYPE]([_transform(types, extra, **link) for link in fields["links"]])
+    sec, nanosec = divmod(fields["stamp_ns"], SECOND)
     header = types["std_msgs/msg/Header"](stamp=time(sec, nanosec), frame_id=fields["frame_id"], **extra)
     if message.msgtype == UPDATE_TYPE:
         rectangle = {key: fields[key] for key in ("x", "y", "width", "height", "data")}
@@ -141,6 +148,24 @@ def _message(store: Any, message: Recorded, *, ros1: bool) -> Any:
         time(0, 0), fields["resolution"], fields["width"], fields["height"], origin
     )
     return types[GRID_TYPE](header, info, fields["data"])
+
+
+def _transform(
+    types: Any,
+    extra: dict[str, int],
+    *,
+    parent: str,
+    child: str,
+    stamp_ns: int,
+    shift: tuple[float, float, float],
+    turn: tuple[float, float, float, float],
+) -> Any:
+    stamp = types["builtin_interfaces/msg/Time"](*divmod(stamp_ns, SECOND))
+    header = types["std_msgs/msg/Header"](stamp=stamp, frame_id=parent, **extra)
+    transform = types["geometry_msgs/msg/Transform"](
+        types["geometry_msgs/msg/Vector3"](*shift), types["geometry_msgs/msg/Quaternion"](*turn)
+    )
+    return types["geometry_msgs/msg/TransformStamped"](header, child, transform)
 
 
 # --- recordings
@@ -236,7 +261,7 @@ def write_mcap(
         for each in messages:
             if each.topic not in channels:
                 name = each.msgtype if profile == "ros2" else each.msgtype.replace("/msg/", "/")
-                definition, _ = ros2_typestore().generate_msgdef(each.msgtype, ros_version=2)
+                definition, _ = ros2_typestore().generate_msgdef(_known(each.msgtype), ros_version=2)
                 schema = writer.register_schema(name, "ros1msg" if is_ros1 else "ros2msg", definition.encode())
                 channels[each.topic] = writer.register_channel(
                     each.topic, encoding or ("ros1" if is_ros1 else "cdr"), schema

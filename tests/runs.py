@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from mapmerge.grid import Grid
-from mapmerge.sim2 import Sim2
-from replay.sources.base import GRID_TYPE, UPDATE_TYPE
+from mapmerge.sim2 import IDENTITY, Sim2
+from replay.sources.base import GRID_TYPE, TF_TYPE, UPDATE_TYPE
 from tests.bags import SECOND, START, Recorded, map_fields
 from tests.floors import FLAT_M, FLAT_WALLS, UNKNOWN, drawn, errors, filled, in_frame, within
 
@@ -75,6 +75,30 @@ def updated(robot: str, seconds: float, col: int, row: int, cells: np.ndarray) -
     rows, cols = cells.shape
     fields = {"stamp_ns": at(seconds), "frame_id": "map", "x": col, "y": row, "width": cols, "height": rows}
     return Recorded(f"/{robot}/map_updates", UPDATE_TYPE, at(seconds), {**fields, "data": cells.reshape(-1)})
+
+
+def link(
+    parent: str, child: str, pose: Sim2 = IDENTITY, stamp_ns: int = 0, *, roll_rad: float = 0.0, **fields: Any
+) -> dict[str, Any]:
+    """Return a transform of a message; ``fields`` are what it says instead."""
+    roll, yaw = roll_rad / 2, pose.yaw_rad / 2
+    turn = (
+        math.cos(yaw) * math.sin(roll),
+        math.sin(yaw) * math.sin(roll),
+        math.sin(yaw) * math.cos(roll),
+        math.cos(yaw) * math.cos(roll),
+    )
+    known = {"parent": parent, "child": child, "stamp_ns": stamp_ns, "shift": (pose.x_m, pose.y_m, 0.0), "turn": turn}
+    return {**known, **fields}
+
+
+def linked(
+    seconds: float, *links: dict[str, Any], static: bool = False, msgtype: str = TF_TYPE, stamp_ns: int | None = None
+) -> Recorded:
+    """Return transforms as they are recorded; those without a stamp have that of the message."""
+    stamp_ns = at(seconds) if stamp_ns is None else stamp_ns
+    stamped = [{**each, "stamp_ns": each["stamp_ns"] or stamp_ns} for each in links]
+    return Recorded("/tf_static" if static else "/tf", msgtype, at(seconds), {"links": stamped})
 
 
 def growing(robot: str, first_s: float = 0.0, **options: Any) -> list[Recorded]:
