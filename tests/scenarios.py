@@ -12,11 +12,24 @@ import numpy as np
 
 from mapmerge.grid import Grid
 from replay.events import Event, Merged
+from replay.init_pose import InitPose
 from replay.options import RunOptions
 from replay.pipeline import merge
 from replay.runs import RunPath
 from tests.bags import Recorded, write_mcap
-from tests.runs import bad_messages, bare_room, begun_anew, flat_map, growing, in_log_order, seen, two_robots
+from tests.runs import (
+    bad_messages,
+    bare_room,
+    begun_anew,
+    flat_map,
+    growing,
+    in_log_order,
+    link,
+    linked,
+    reference_from,
+    seen,
+    two_robots,
+)
 
 
 @dataclass(frozen=True)
@@ -26,10 +39,17 @@ class Scenario:
     record: Callable[[], Sequence[Recorded]]
     is_so: Callable[[Merged | None], bool]
     images: str = "none"
+    init_poses: tuple[InitPose, ...] = ()
+    use_tf: bool = False
 
 
 def _nothing() -> Grid:
     return Grid(np.full((20, 30), -1, np.int8), 0.1)
+
+
+def _pose_of(robot: str) -> tuple[float, float, float]:
+    pose = reference_from(robot)
+    return pose.x_m, pose.y_m, pose.yaw_rad
 
 
 def _statuses(event: Merged | None) -> list[str]:
@@ -67,6 +87,12 @@ SCENARIOS: dict[str, Scenario] = {
         lambda: in_log_order(*(list(bad_messages(robot, 0.0).values()) for robot in ("r1", "r2"))),
         lambda last: last is None,
     ),
+    "believed": Scenario(
+        lambda: in_log_order([linked(0.0, link("", "r3/map"))], two_robots(), growing("r3", 1.0)),
+        lambda last: last.report["robots"]["r2"]["prior"] is not None and len(last.report["notes"]) == 1,
+        init_poses=(InitPose("r2", *_pose_of("r2")),),
+        use_tf=True,
+    ),
     "one_robot": Scenario(lambda: growing("r1"), lambda last: _statuses(last) == ["reference"], images="changed"),
 }
 
@@ -77,7 +103,12 @@ def events_of(name: str) -> tuple[Event, ...]:
     scenario = SCENARIOS[name]
     with tempfile.TemporaryDirectory() as folder:
         path = write_mcap(Path(folder) / "run.mcap", scenario.record())
-        options = RunOptions((RunPath(None, path),), images=scenario.images)  # type: ignore[arg-type]
+        options = RunOptions(
+            (RunPath(None, path),),
+            images=scenario.images,  # type: ignore[arg-type]
+            init_poses=scenario.init_poses,
+            use_tf=scenario.use_tf,
+        )
         events = tuple(merge(options))
     last = next((event for event in reversed(events) if isinstance(event, Merged)), None)
     assert scenario.is_so(last), (name, last)

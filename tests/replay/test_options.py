@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from replay.errors import UsageError
+from replay.init_pose import InitPose
 from replay.options import RunOptions, TimeBound, seconds_to_ns
 from replay.runs import RunPath, TopicChoice
 
@@ -70,6 +71,8 @@ def test_settings_are_json_and_all_that_affects_results() -> None:
         start=TimeBound(5, relative=True),
         strict=True,
         images="all",
+        init_poses=(InitPose("r2", 1.0, 2.0, 0.5),),
+        use_tf=True,
     )
     settings = options.settings()
     assert json.loads(json.dumps(settings)) == settings
@@ -77,4 +80,7 @@ def test_settings_are_json_and_all_that_affects_results() -> None:
     assert settings["stop"] is None
     assert settings["topics"] == [{"robot": "r1", "topic": "/x"}]
     assert settings["merge"]["method"] == "correlation"
+    assert settings["use_tf"] is True
+    (pose,) = settings["init_poses"]
+    assert InitPose(**pose) == InitPose("r2", 1.0, 2.0, 0.5)
     assert not {"images", "strict", "runs"} & set(settings)

@@ -13,7 +13,7 @@ from replay.runs import RunPath
 from replay.sources.base import UPDATE_TYPE
 from tests.bags import SECOND, Recorded, write_mcap, write_rosbag2
 from tests.fakes import FakeSource
-from tests.runs import at, growing, seen, two_robots
+from tests.runs import at, growing, in_log_order, link, linked, seen, two_robots
 
 
 def planned(*runs: str | Path, **options: Any) -> Plan:
@@ -79,6 +79,35 @@ def test_what_is_said_of_inputs_before_they_are_read(tmp_path: Path, two: Path) 
     assert (second["name"], second["format"], second["robots"]) == ("bag", "rosbag2", ["r3"])
     assert second["size_bytes"] == sum(file.stat().st_size for file in bag.iterdir())
     assert (first["messages"], first["late"], first["sha256"]) == (None, None, None)
+
+
+class TestTransforms:
+    TF = (linked(0.5, link("world", "r1/map"), static=True), linked(1.0, link("world", "r2/map")))
+
+    def test_are_read_only_if_asked_for(self, tmp_path: Path) -> None:
+        run = write_mcap(tmp_path / "run.mcap", in_log_order(self.TF, two_robots()))
+        assert planned(run).transform_feeds is None
+        static, moving = planned(run, use_tf=True).transform_feeds or ()
+        assert dict(static.robot_of) == {"/tf_static": ""}
+        assert dict(moving.robot_of) == {"/tf": ""}
+        assert (dict(static.clocks), dict(moving.clocks)) == ({"/tf_static": "none"}, {"/tf": "header"})
+
+    def test_are_on_the_clock_of_the_maps_beside_them(self, tmp_path: Path) -> None:
+        a = write_mcap(tmp_path / "a.mcap", growing("r1"))
+        b = write_mcap(tmp_path / "b.mcap", in_log_order(self.TF[1:], growing("r2", 100.0, stamp_ns=0)))
+        (moving,) = planned(a, b, use_tf=True, align_starts=True).transform_feeds or ()
+        assert moving.source.path == b
+        assert (dict(moving.clocks), dict(moving.offsets_ns)) == ({"/tf": "log"}, {"/tf": -100 * SECOND})
+
+    def test_topics_that_are_only_called_so_are_not(self, tmp_path: Path) -> None:
+        text = Recorded("/tf", "std_msgs/msg/String", at(1.0), {"data": "no transform"})
+        run = write_mcap(tmp_path / "run.mcap", in_log_order([text], two_robots()))
+        assert planned(run, use_tf=True).recordings_with_transforms() == []
+
+    def test_frames_are_told_as_recorded(self, tmp_path: Path) -> None:
+        messages = [seen("r1", 0.0, frame="/map"), seen("r2", 1.0, frame="map"), seen("r3", 2.0, resolution=0.0)]
+        plan = planned(write_mcap(tmp_path / "run.mcap", messages))
+        assert dict(plan.map_frames) == {"r1": "map", "r2": "map", "r3": ""}
 
 
 def test_no_recording() -> None:

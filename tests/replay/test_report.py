@@ -15,10 +15,11 @@ from mapmerge.fuse import Agreement
 from mapmerge.grid import Grid
 from mapmerge.merger import MergeResult, MergeState, step
 from mapmerge.outcome import RobotOutcome, Status
+from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
 from replay.errors import BadMessage
-from replay.events import Report, RobotInput, SkipCause, Skipped
+from replay.events import Noted, Report, RobotInput, SkipCause, Skipped
 from replay.report import ReportBuilder
 from tests.runs import bare_room, begun_anew, flat_map, is_right, reference_from
 
@@ -127,6 +128,32 @@ def test_skipped_messages_are_counted_by_cause() -> None:
     found = report.build(None, MergeState.initial(ROBOTS).result, [INPUT])
     validate(found)
     assert list(found["skipped"].items()) == [("bad_origin", 1), ("empty", 2)]
+
+
+def test_what_was_believed() -> None:
+    prior = Prior(Sim2(1.23456789, 2.0, 0.5), 0.5, 0.6, 0.1, "recorded in /tf")
+    report, priors = builder(), {"r2": prior}
+    maps = {robot: flat_map(robot) for robot in ("r1", "r2")}
+    _, result = step(MergeState.initial(ROBOTS), maps, MergeConfig(), priors)
+    report.take(0, result, priors)
+    found = report.build(0, result, [INPUT])
+    validate(found)
+    told = {
+        "pose": {"x_m": 1.234568, "y_m": 2.0, "yaw_rad": 0.5, "scale": 1.0},
+        "sigma": {"x_m": 0.5, "y_m": 0.6, "yaw_rad": 0.1},
+        "origin": "recorded in /tf",
+    }
+    assert [robot["prior"] for robot in found["robots"].values()] == [None, told, None]
+    assert [pair["prior"] for pair in found["pairs"]] == [told]
+
+
+def test_notes_are_kept_in_order() -> None:
+    report = builder()
+    for robot in ("r3", "r2"):
+        report.note(Noted(robot, f"of {robot}"))
+    found = report.build(None, MergeState.initial(ROBOTS).result, [INPUT])
+    validate(found)
+    assert found["notes"] == [{"robot": "r3", "message": "of r3"}, {"robot": "r2", "message": "of r2"}]
 
 
 class TestNumbers:

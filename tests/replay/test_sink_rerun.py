@@ -22,7 +22,7 @@ from mapmerge.merger import MergeState, step
 from mapmerge.outcome import Status
 from mapmerge.sim2 import IDENTITY, Sim2
 from replay.errors import OutputError
-from replay.events import Event, Finished, Merged, RobotInput, SkipCause, Skipped, Started, Timing
+from replay.events import Event, Finished, Merged, Noted, RobotInput, SkipCause, Skipped, Started, Timing
 from replay.gallery import Gallery
 from replay.options import OutputOptions, RunOptions
 from replay.report import ReportBuilder
@@ -302,6 +302,15 @@ def test_a_run_without_any_map_is_still_a_recording(tmp_path: Path) -> None:
     path = written(tmp_path / "none.rrd", [started, skipped, finished])
     texts = Entity(path, "/decisions").values("TextLog:text")
     assert "r1 is not merged: no map that shows anything yet" in texts
+
+
+def test_what_a_reader_should_know_is_among_the_decisions(tmp_path: Path) -> None:
+    started, *rest = events_of(["r1"], {STAMPS[0]: {"r1": flat_map("r1")}})
+    skipped = Skipped("", "/tf", 12, SkipCause.BAD_TRANSFORM, "the transform from 'b' to 'a' is none", "run.mcap")
+    path = written(tmp_path / "noted.rrd", [started, Noted("r2", "no prior is used for it"), skipped, *rest])
+    texts = Entity(path, "/decisions").values("TextLog:text")
+    assert "+0.0 s  r2: no prior is used for it" in texts
+    assert "+0.0 s  a message of /tf was skipped: the transform from 'b' to 'a' is none" in texts
 
 
 def test_maps_that_know_nothing_or_have_no_walls_are_no_trouble(tmp_path: Path) -> None:
