@@ -158,6 +158,11 @@ class VerifyConfig(_Settings):
     distinct_m: float = 0.75
     distinct_rad: float = math.radians(5.0)
 
+    def __post_init__(self) -> None:
+        super(VerifyConfig, self).__post_init__()
+        if self.min_confidence > 1.0:
+            raise ConfigError(f"min_confidence is {self.min_confidence}; expected a probability, at most 1")
+
 
 @dataclass(frozen=True, slots=True)
 class MergeConfig(_Settings):

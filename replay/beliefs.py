@@ -25,7 +25,7 @@ class Beliefs:
     Parameters
     ----------
     frames
-        Each robot's map frame as recorded, the reference first.
+        Each robot's map frame as recorded, the reference first; None without a usable map.
     given
         Poses that were given; they are believed rather than transforms.
     recordings
@@ -33,14 +33,14 @@ class Beliefs:
     """
 
     def __init__(
-        self, frames: Mapping[str, str], given: Sequence[InitPose], recordings: Sequence[Source] | None
+        self, frames: Mapping[str, str | None], given: Sequence[InitPose], recordings: Sequence[Source] | None
     ) -> None:
-        self._frames = frames
         self._reference = next(iter(frames))
+        self._frames = {robot: frame for robot, frame in frames.items() if frame is not None}
         self._given = {item.robot: item.prior() for item in given}
         self._buffers = {recording: TransformBuffer() for recording in recordings or ()}
-        others = [robot for robot in frames if robot != self._reference and robot not in self._given]
-        asked = others if recordings is not None else []
+        others = [robot for robot in self._frames if robot != self._reference and robot not in self._given]
+        asked = others if recordings is not None and self._reference in self._frames else []
         self._hopeless = {robot: why for robot in asked if (why := self._why_hopeless(robot))}
         self._open = [robot for robot in asked if robot not in self._hopeless]
         self._linked: set[str] = set()
@@ -76,8 +76,14 @@ class Beliefs:
     def missed(self) -> Iterator[Noted]:
         """Say, once all was read, for which robots no transform was found."""
         for robot in self._open:
-            if robot not in self._linked:
-                ends = f"its map frame {self._frames[robot]!r} with {self._frames[self._reference]!r}"
+            if robot in self._linked:
+                continue
+            ends = f"its map frame {self._frames[robot]!r} with {self._frames[self._reference]!r}"
+            if self._chain(robot) is not None:
+                yield Noted(
+                    robot, f"transforms link {ends} only after the last map; {_WITHOUT}: are the clocks the same?"
+                )
+            else:
                 yield Noted(robot, f"no chain of transforms in /tf and /tf_static links {ends}; {_WITHOUT}")
 
     def _chain(self, robot: str) -> Chain | None:

@@ -37,7 +37,7 @@ class Plan:
     window
         Which times are used.
     map_frames
-        Each robot's map frame as recorded, its leading slash stripped; "" where that is not known.
+        Each robot's map frame as recorded, its leading slash stripped; None without a usable map.
     transform_feeds
         Which transforms are read; None if none are to be used.
     """
@@ -46,7 +46,7 @@ class Plan:
     robots: tuple[RobotInput, ...]
     feeds: tuple[Feed, ...]
     window: Window
-    map_frames: Mapping[str, str]
+    map_frames: Mapping[str, str | None]
     transform_feeds: tuple[Feed, ...] | None
 
     def recordings_with_transforms(self) -> list[Source] | None:
@@ -137,7 +137,7 @@ def _plan(sources: list[Source], options: RunOptions) -> Plan:
         _robots(selected, probes, infos, frame_ids),
         _feeds(sources, selected, probes, offsets, untimed_ns),
         window,
-        {item.robot: frame_ids.get(item.robot, "").lstrip("/") for item in selected},
+        {item.robot: _bare(frame_ids.get(item.robot)) for item in selected},
         transform_feeds(sources, probes, offsets, options.clock) if options.use_tf else None,
     )
 
@@ -196,6 +196,10 @@ def _span_ns(probes: list[Probe], offsets: Mapping[tuple[int, str], int]) -> tup
     first = [item.first_ns + shift for item, shift in shifts if item.first_ns is not None]
     last = [item.last_ns + shift for item, shift in shifts if item.last_ns is not None]
     return min(first, default=0), max(last, default=0)
+
+
+def _bare(frame_id: str | None) -> str | None:
+    return None if frame_id is None else frame_id.lstrip("/")
 
 
 def _frame_ids(probes: list[Probe]) -> dict[str, str]:

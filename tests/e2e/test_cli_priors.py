@@ -221,6 +221,18 @@ class TestUseTf:
         assert [each.target_from_source.x_m if each else None for each in matcher.priors] == pytest.approx([0.5])
         assert ran.robots["b"]["prior"]["pose"]["x_m"] == pytest.approx(5.0)
 
+    def test_of_a_recording_without_maps(
+        self, merged: Callable[..., Any], matcher: RecordingMatcher, tmp_path: Path
+    ) -> None:
+        maps = write_mcap(tmp_path / "maps.mcap", robots())
+        placed = write_rosbag1(tmp_path / "tf.bag", [linked(1.5, link("r1/map", "r2/map", TRUE))])
+        ran = merged(maps, placed, "--use-tf")
+        assert near(matcher.priors[0], TRUE)
+        read = [
+            {topic: each["messages"] for topic, each in item["transforms"].items()} for item in ran.report["inputs"]
+        ]
+        assert read == [{}, {"/tf": 1}]
+
     def test_a_given_pose_wins(self, merged: Callable[..., Any], matcher: RecordingMatcher, tmp_path: Path) -> None:
         merged(write_mcap(tmp_path / "run.mcap", RECORDED), "--use-tf", "--init-pose", "r2=1,2,0")
         assert near(matcher.priors[0], Sim2(1.0, 2.0))

@@ -41,6 +41,11 @@ class TestNumbers:
         with pytest.raises(ConfigError, match="reject_m"):
             RefineConfig(reject_m=reject_m)
 
+    @pytest.mark.parametrize("value", [1.001, 99.9])
+    def test_a_confidence_is_a_probability(self, value):
+        with pytest.raises(ConfigError, match="min_confidence"):
+            VerifyConfig(min_confidence=value)
+
     def test_zero_is_a_fine_threshold(self):
         assert VerifyConfig(min_overlap_m2=0.0, min_matched_wall_m=0, min_margin=0.0).min_margin == 0.0
         assert SearchConfig(free_weight=0.0, working_cell_m=0.0).free_weight == 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pytest
@@ -35,7 +35,10 @@ def told(
 
 
 def beliefs(
-    *recordings: Source, frames: dict[str, str] | None = None, given: Sequence[InitPose] = (), use_tf: bool = True
+    *recordings: Source,
+    frames: Mapping[str, str | None] | None = None,
+    given: Sequence[InitPose] = (),
+    use_tf: bool = True,
 ) -> Beliefs:
     return Beliefs(frames or FRAMES, given, recordings if use_tf else None)
 
@@ -134,6 +137,20 @@ class TestWhatIsSaid:
     def test_frames_without_a_name(self, frames: dict[str, str], whose: str) -> None:
         said = messages(beliefs(FakeSource([]), frames=frames).foreseen())
         assert f"the maps of {whose} name no frame" in said["r2"]
+
+    @pytest.mark.parametrize("frames", [{"r1": "r1/map", "r2": None}, {"r1": None, "r2": "r2/map"}])
+    def test_nothing_of_robots_without_a_map(self, frames: dict[str, str | None]) -> None:
+        known = beliefs(FakeSource([]), frames=frames)
+        assert messages(known.foreseen()) == messages(known.missed()) == {}
+        assert known.now() == ({}, ())
+
+    def test_transforms_that_come_too_late(self) -> None:
+        recording = FakeSource([])
+        known = beliefs(recording, frames={"r1": "r1/map", "r2": "r2/map"})
+        assert known.now() == ({}, ())
+        told(known, recording, "r2/map", POSE, 9)
+        (said,) = messages(known.missed()).values()
+        assert "'r2/map' with 'r1/map' only after the last map" in said
 
     def test_a_tilted_transform_once(self) -> None:
         recording = FakeSource([])

@@ -107,7 +107,7 @@ class TestTransforms:
     def test_frames_are_told_as_recorded(self, tmp_path: Path) -> None:
         messages = [seen("r1", 0.0, frame="/map"), seen("r2", 1.0, frame="map"), seen("r3", 2.0, resolution=0.0)]
         plan = planned(write_mcap(tmp_path / "run.mcap", messages))
-        assert dict(plan.map_frames) == {"r1": "map", "r2": "map", "r3": ""}
+        assert dict(plan.map_frames) == {"r1": "map", "r2": "map", "r3": None}
 
 
 def test_no_recording() -> None:
