@@ -127,7 +127,12 @@ def _input_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _placing_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("how maps are placed")
-    group.add_argument("--method", metavar="NAME", default="correlation", help="correlation (default: %(default)s)")
+    group.add_argument(
+        "--method",
+        metavar="NAME",
+        default="correlation",
+        help="how two maps are matched: correlation (default: %(default)s)",
+    )
     group.add_argument(
         "--scale",
         choices=("metadata", "free"),

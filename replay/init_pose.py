@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mapmerge.prior import Prior
@@ -95,6 +96,30 @@ class InitPose:
             self.sigma_yaw_rad,
             f"given for {self.robot}",
         )
+
+
+def refuse_unfit(robots: Sequence[str], poses: Sequence[InitPose]) -> None:
+    """Refuse poses of robots that are not merged, two poses of one robot, and one of the reference.
+
+    Parameters
+    ----------
+    robots
+        Those that are merged, the reference first.
+    """
+    reference, *others = robots
+    taken: set[str] = set()
+    for item in poses:
+        if item.robot == reference:
+            raise UsageError(
+                f"--init-pose {item.robot}: {reference} is the reference, whose map frame is the merged frame; give "
+                "poses of the other robots, or another reference, first in --robots"
+            )
+        if item.robot not in others:
+            there = ", ".join(others) or f"none but the reference {reference}"
+            raise UsageError(f"--init-pose {item.robot}: no such robot is merged; there are: {there}")
+        if item.robot in taken:
+            raise UsageError(f"--init-pose {item.robot}: given twice; give one pose for each robot")
+        taken.add(item.robot)
 
 
 def _radians(number: str, unit: str) -> float:

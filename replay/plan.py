@@ -12,7 +12,7 @@ from replay.arrivals import Feed, Tally, Window
 from replay.clocks import Probe, agreed, frames, offsets_ns, probe, refuse_recorded_twice
 from replay.errors import UsageError
 from replay.events import Clock, RobotInput
-from replay.init_pose import InitPose
+from replay.init_pose import refuse_unfit
 from replay.options import NS_PER_S, RunOptions
 from replay.selection import Selected, select
 from replay.sources import open_source
@@ -89,7 +89,7 @@ class Plan:
                     for topic in each.robot_of
                 },
             }
-            for feed, info, tally in zip(self.feeds, self.infos, read, strict=False)
+            for feed, info, tally in zip(self.feeds, self.infos, read[: len(self.feeds)], strict=True)
         )
 
 
@@ -119,7 +119,7 @@ def open_plan(options: RunOptions) -> Iterator[Plan]:
 def _plan(sources: list[Source], options: RunOptions) -> Plan:
     infos = tuple(source.info for source in sources)
     selected = select(options.runs, infos, robots=options.robots, topics=options.topics)
-    _refuse_unfit_poses([item.robot for item in selected], options.init_poses)
+    refuse_unfit([item.robot for item in selected], options.init_poses)
     probes = agreed(_probes(sources, infos, selected, options))
     refuse_recorded_twice(probes, [run.path.name for run in options.runs], options.reorder_window_ns)
     offsets = offsets_ns(selected[0].robot, probes, align_starts=options.align_starts)
@@ -140,24 +140,6 @@ def _plan(sources: list[Source], options: RunOptions) -> Plan:
         {item.robot: _bare(frame_ids.get(item.robot)) for item in selected},
         transform_feeds(sources, probes, offsets, options.clock) if options.use_tf else None,
     )
-
-
-def _refuse_unfit_poses(robots: list[str], poses: tuple[InitPose, ...]) -> None:
-    """Refuse poses of robots that there are not, two poses of one robot, and one of the reference."""
-    reference, *others = robots
-    taken: set[str] = set()
-    for item in poses:
-        if item.robot == reference:
-            raise UsageError(
-                f"--init-pose {item.robot}: {reference} is the reference, whose map frame is the merged frame; give "
-                "poses of the other robots, or another reference, first in --robots"
-            )
-        if item.robot not in others:
-            there = ", ".join(others) or f"none but the reference {reference}"
-            raise UsageError(f"--init-pose {item.robot}: no such robot is merged; there are: {there}")
-        if item.robot in taken:
-            raise UsageError(f"--init-pose {item.robot}: given twice; give one pose for each robot")
-        taken.add(item.robot)
 
 
 def _refuse_empty(window: Window, start_ns: int, stop_ns: int) -> None:
