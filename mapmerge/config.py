@@ -10,7 +10,18 @@ from mapmerge.errors import ConfigError
 
 ScaleChoice = Literal["metadata", "free"]
 
-_DIVISORS = {"scale_range", "wall_spacing_m", "angle_step_rad", "cell_m", "reject_m", "blur_cells"}
+_DIVISORS = {
+    "scale_range",
+    "wall_spacing_m",
+    "angle_step_rad",
+    "cell_m",
+    "reject_m",
+    "rough_reject_m",
+    "sweep_step_rad",
+    "sweep_cell_m",
+    "scale_step",
+    "blur_cells",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +75,14 @@ class SearchConfig(_Settings):
     angle_step_rad
         Step of the orientation spectrum.
     rotations
-        Rotations taken from the spectra's correlation; each is tried as it is and turned by 180°.
+        Rotations taken from the correlation of each of the two kinds of spectra; each is tried as it is and turned by
+        180°.
     cell_m
         Side of the cells of the coarse maps that are correlated; larger where the maps have larger cells, or would
         need more than `max_side_cells` of them.
-    free_weight
-        What a wall in the other map's free space costs, against 1 for a wall on a wall.
+    free_weights
+        What a wall in the other map's free space costs, against 1 for a wall on a wall: candidates are taken for each
+        of these, as maps that are bent ask for a low weight and maps that share little for a high one.
     shifts
         Peaks of the correlation surface that are taken for each rotation.
     peak_distance_m
@@ -77,45 +90,70 @@ class SearchConfig(_Settings):
     max_side_cells
         Most cells a side of the correlated maps.
     max_candidates
-        Candidates of all rotations that are refined.
+        Candidates of all rotations that are aligned, for each weight.
+    sweep_step_rad, sweep_cell_m, sweep_free_weights, sweep_shifts
+        The same for the second look, at all rotations.
+    scale_step
+        Ratio of two scales that are tried, where the scale is free.
+    clear_agreement, clear_wall_m, clear_likeness
+        A placement is clear, and no second look is taken, with at least this wall agreement and so much matched wall,
+        and no rival that is more than so many times as good.
     working_cell_m
         Two maps are matched at the coarser of their resolutions, and never finer than this.
     """
 
     wall_spacing_m: float = 0.10
     angle_step_rad: float = math.radians(1.0)
-    rotations: int = 4
+    rotations: tuple[int, int] = (4, 3)
     cell_m: float = 0.20
-    free_weight: float = 0.25
+    free_weights: tuple[float, ...] = (0.5, 1.8)
     shifts: int = 8
     peak_distance_m: float = 0.8
     max_side_cells: int = 1500
-    max_candidates: int = 48
+    max_candidates: int = 40
+    sweep_step_rad: float = math.radians(3.0)
+    sweep_cell_m: float = 0.30
+    sweep_free_weights: tuple[float, ...] = (1.0,)
+    sweep_shifts: int = 4
+    scale_step: float = 1.05
+    clear_agreement: float = 0.85
+    clear_wall_m: float = 10.0
+    clear_likeness: float = 0.6
     working_cell_m: float = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class RefineConfig(_Settings):
-    """How a candidate is aligned (ICP against a distance transform).
+    """How candidates are aligned (ICP against the nearest walls).
 
     Parameters
     ----------
-    reject_m
-        Pairs further apart than this are left out, in turn; the search narrows from the first to the last.
+    rough_reject_m, reject_m
+        One step for each of these, beyond which pairs are left out: of the first pass, with all candidates, and of the
+        second, with the best of them.
+    rough_points, points
+        Wall points used in these passes, evenly thinned.
+    rough_probes, probes
+        Points that are looked up in the other map to rank candidates after these passes.
+    survivors
+        Candidates that take part in the second pass.
     iterations
-        At most so many steps at each of these distances.
-    max_points
-        Wall points used, evenly thinned.
+        Most steps of the last, finest alignment.
     max_polish_points
-        Wall cells used in the last, finest alignment.
+        Wall cells used in it.
     blur_cells
         Standard deviation, in cells, by which walls are blurred there.
     """
 
-    reject_m: tuple[float, ...] = (0.8, 0.4, 0.2)
+    rough_reject_m: tuple[float, ...] = (1.0, 0.8, 0.8, 0.5, 0.5, 0.5, 0.3, 0.3)
+    reject_m: tuple[float, ...] = (0.4, 0.3, 0.2, 0.2, 0.15, 0.15)
+    rough_points: int = 300
+    points: int = 1000
+    rough_probes: int = 400
+    probes: int = 2000
+    survivors: int = 16
     iterations: int = 12
-    max_points: int = 1500
-    max_polish_points: int = 3000
+    max_polish_points: int = 1500
     blur_cells: float = 1.0
 
 
@@ -127,6 +165,9 @@ class VerifyConfig(_Settings):
     ----------
     tolerance_m
         A wall is matched by a wall at most this far away.
+    near_m
+        A wall that is not matched, in free space, but this near to a wall, may be bent or moved; one farther off is a
+        contradiction.
     violation_weight, free_weight
         Score of a placement in metres: matched wall − `violation_weight` × metres of wall in the other's free space
         + `free_weight` × m² of agreeing free space.
@@ -135,11 +176,10 @@ class VerifyConfig(_Settings):
     min_matched_wall_m
         Least length of wall that both maps saw.
     min_acceptance
-        Least acceptance index ω.
-    min_wall_agreement
-        Least share of the walls in the overlap that the other map has as well, in the worse of both directions.
-    min_margin
-        Least lead over the best distinct rival, as a share of the score.
+        Least acceptance index ω; of the methods that state no confidence.
+    poor_agreement, rival_likeness
+        What is named as the reason where the confidence is too low: walls that disagree, if less than this share
+        of them agrees; else ambiguity, if a rival is more than so many times as good.
     min_confidence
         Least calibrated probability that the placement is right, where the method states one.
     distinct_m, distinct_rad
@@ -147,13 +187,14 @@ class VerifyConfig(_Settings):
     """
 
     tolerance_m: float = 0.15
-    violation_weight: float = 2.0
-    free_weight: float = 0.5
+    near_m: float = 0.5
+    violation_weight: float = 2.5
+    free_weight: float = 0.15
     min_overlap_m2: float = 10.0
     min_matched_wall_m: float = 8.0
     min_acceptance: float = 0.95
-    min_wall_agreement: float = 0.8
-    min_margin: float = 0.4
+    poor_agreement: float = 0.8
+    rival_likeness: float = 0.5
     min_confidence: float = 0.999
     distinct_m: float = 0.75
     distinct_rad: float = math.radians(5.0)

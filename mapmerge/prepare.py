@@ -5,6 +5,7 @@ All of it is in the frame of the map's grid, cropped to what is known: metres fr
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -18,8 +19,39 @@ from mapmerge.sim2 import Points
 
 FREE_SPACING_M = 0.25
 _MARGIN_M = 1.0
+_MARGIN_SLACK_M = 0.1
+_DIRECTION_SQUARES = 7
 
-CELL_UNKNOWN, CELL_FREE, CELL_OCCUPIED = 0, 1, 2
+CELL_UNKNOWN, CELL_FREE, CELL_OCCUPIED, CELL_UNSURE = 0, 1, 2, 3
+MEETS_FREE, MEETS_WALL, MEETS_NEAR = 1, 2, 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NearestWalls:
+    """Which wall is nearest to a place, as a look-up.
+
+    Parameters
+    ----------
+    index
+        Shape (rows, columns): for each cell the row of `PreparedMap.walls_m` that is nearest.
+    cell_m
+        Side of a cell: `PreparedMap.wall_spacing_m`, so that each cell holds at most one of these walls.
+    margin
+        Cells of padding on each side: a place beyond is looked up in the padding, out of the reach of ICP.
+    """
+
+    index: NDArray[np.int32]
+    cell_m: float
+    margin: int
+
+    def wall_at(self, x_m: NDArray[np.float32], y_m: NDArray[np.float32]) -> NDArray[np.int32]:
+        """Return the row of the nearest wall for places of any shape; beyond the padding, that of its border."""
+        rows, cols = self.index.shape
+        inverse, margin = np.float32(1.0 / self.cell_m), np.float32(self.margin)
+        col = np.clip((x_m * inverse + margin).astype(np.int32), 0, cols - 1)
+        row = np.clip((y_m * inverse + margin).astype(np.int32), 0, rows - 1)
+        found: NDArray[np.int32] = self.index.ravel()[row * cols + col]
+        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,16 +63,21 @@ class PreparedMap:
     grid
         The map at the working resolution, cropped to what is known.
     classes
-        Shape (rows, columns), uint8: `CELL_UNKNOWN`, `CELL_FREE` or `CELL_OCCUPIED`; padded by `margin` cells.
+        Shape (rows, columns), uint8: `CELL_UNKNOWN`, `CELL_FREE`, `CELL_OCCUPIED` or, where known as neither,
+        `CELL_UNSURE`; padded by `margin` cells.
     wall_distance_m
         Shape as `classes`: distance of each cell to the nearest occupied one.
-    nearest_wall, nearest_wall_too
-        Shape as `classes`: row of `wall_cells_m` that is nearest. Where several are, these are one from each end of
-        the map, so that their mean prefers no direction.
+    meets
+        Shape as `classes`, uint8: what a point there meets, bits `MEETS_FREE`, `MEETS_WALL` and `MEETS_NEAR`.
+    nearest
+        The nearest of `walls_m` for each place.
     wall_cells_m
         Centres of all occupied cells, shape (N, 2).
     walls_m
         The same thinned to one point per `SearchConfig.wall_spacing_m`, shape (M, 2).
+    directions
+        For each of `walls_m` which way the wall runs, shape (M, 2): cosine and sine of twice the angle, shorter than 1
+        where it is no straight line.
     free_m
         Free space, one point per about `FREE_SPACING_M`, shape (K, 2).
     wall_spacing_m, free_spacing_m
@@ -52,10 +89,11 @@ class PreparedMap:
     grid: Grid
     classes: NDArray[np.uint8]
     wall_distance_m: NDArray[np.float32]
-    nearest_wall: NDArray[np.int32]
-    nearest_wall_too: NDArray[np.int32]
+    meets: NDArray[np.uint8]
+    nearest: NearestWalls
     wall_cells_m: Points
     walls_m: Points
+    directions: NDArray[np.float32]
     free_m: Points
     wall_spacing_m: float
     free_spacing_m: float
@@ -86,41 +124,101 @@ class PreparedMap:
 def prepare(grid: Grid, resolution_m: float, config: MergeConfig) -> PreparedMap:
     """Prepare a map for matching at a resolution that is not finer than its own."""
     cropped = at_resolution(grid.cropped_to_known(), resolution_m, config.cells)
-    # a point outside of the map is looked up in a corner of the margin, which must be beyond the reach of ICP
-    margin = int(np.ceil(max(_MARGIN_M, *config.refine.reject_m) / resolution_m)) + 1
-    occupied = np.pad(cropped.cells >= config.cells.min_occupied_percent, margin)
-    free = np.pad((cropped.cells >= 0) & (cropped.cells <= config.cells.max_free_percent), margin)
-    classes = np.where(occupied, CELL_OCCUPIED, np.where(free, CELL_FREE, CELL_UNKNOWN)).astype(np.uint8)
-    distance_m, nearest = _distance_to_walls(occupied, resolution_m)
-    _, turned = _distance_to_walls(occupied[::-1, ::-1], resolution_m)
+    reach_m = max(_MARGIN_M, *config.refine.rough_reject_m, *config.refine.reject_m) + _MARGIN_SLACK_M
+    margin = math.ceil(reach_m / resolution_m) + 1
+    classes = np.pad(_classes_of(cropped.cells, config), margin, constant_values=CELL_UNKNOWN)
+    occupied = classes == CELL_OCCUPIED
+    distance_m = _distance_to_walls_m(occupied, resolution_m)
     wall_cells_m = _centres(occupied, margin, resolution_m)
+    spacing_m = max(config.search.wall_spacing_m, resolution_m)
+    walls_m, nearest = _walls(wall_cells_m, spacing_m, reach_m)
+    directions = _directions(walls_m, spacing_m)
     step = max(1, round(FREE_SPACING_M / resolution_m))
+    free = classes == CELL_FREE
+    tolerance_m = max(config.verify.tolerance_m, resolution_m)
     return PreparedMap(
         grid=cropped,
         classes=classes,
         wall_distance_m=distance_m,
-        nearest_wall=nearest,
-        nearest_wall_too=np.ascontiguousarray(max(len(wall_cells_m) - 1, 0) - turned[::-1, ::-1]),
+        meets=(
+            free.view(np.uint8) * np.uint8(MEETS_FREE)
+            + (distance_m <= tolerance_m).view(np.uint8) * np.uint8(MEETS_WALL)
+            + (distance_m <= config.verify.near_m).view(np.uint8) * np.uint8(MEETS_NEAR)
+        ),
+        nearest=nearest,
         wall_cells_m=wall_cells_m,
-        walls_m=thinned(wall_cells_m, config.search.wall_spacing_m),
+        walls_m=walls_m,
+        directions=directions,
         free_m=_sampled(free, margin, resolution_m, step),
-        wall_spacing_m=max(config.search.wall_spacing_m, resolution_m),
+        wall_spacing_m=spacing_m,
         free_spacing_m=step * resolution_m,
         margin=margin,
     )
 
 
 def thinned(points_m: Points, spacing_m: float) -> Points:
-    """Return the mean point of each occupied square of this side, in a fixed order."""
+    """Return the mean point of each occupied square of this side, row by row."""
     if len(points_m) == 0:
         return points_m
-    square = np.floor(points_m / spacing_m + 1e-9).astype(np.int64)
+    square = np.floor(points_m / spacing_m + 1e-9).astype(np.intp)
     square -= square.min(axis=0)
-    key = square[:, 1] * (int(square[:, 0].max()) + 1) + square[:, 0]
-    _, member, count = np.unique(key, return_inverse=True, return_counts=True)
-    sums = [np.bincount(member, weights=points_m[:, axis], minlength=len(count)) for axis in (0, 1)]
-    means: Points = np.stack(sums, axis=1) / count[:, None]
+    member = square[:, 1] * (int(square[:, 0].max()) + 1) + square[:, 0]
+    count = np.bincount(member)
+    key = np.flatnonzero(count)
+    sums = [np.bincount(member, weights=points_m[:, axis])[key] for axis in (0, 1)]
+    means: Points = np.stack(sums, axis=1) / count[key][:, None]
     return means
+
+
+def _directions(walls_m: Points, spacing_m: float) -> NDArray[np.float32]:
+    """Return which way each wall runs, from the spread of the walls around it."""
+    if len(walls_m) == 0:
+        return np.zeros((0, 2), np.float32)
+    square = np.floor(walls_m / spacing_m + 1e-9).astype(np.intp)
+    cols, rows = (square.max(axis=0) + 1).tolist()
+    centre_m = walls_m.mean(axis=0)
+    x, y = (walls_m - centre_m).T
+    moments = np.zeros((6, rows, cols))
+    moments[:, square[:, 1], square[:, 0]] = (np.ones_like(x), x, y, x * x, y * y, x * y)
+    size = (_DIRECTION_SQUARES, _DIRECTION_SQUARES)
+    around = [
+        cv2.boxFilter(image, cv2.CV_64F, size, normalize=False, borderType=cv2.BORDER_CONSTANT) for image in moments
+    ]
+    count, sum_x, sum_y, sum_xx, sum_yy, sum_xy = (image[square[:, 1], square[:, 0]] for image in around)
+    xx, yy, xy = sum_xx - sum_x**2 / count, sum_yy - sum_y**2 / count, sum_xy - sum_x * sum_y / count
+    total = np.maximum(xx + yy, 1e-9)
+    return np.stack([(xx - yy) / total, 2 * xy / total], axis=1).astype(np.float32)
+
+
+def _classes_of(cells: NDArray[np.int8], config: MergeConfig) -> NDArray[np.uint8]:
+    value = np.arange(256, dtype=np.uint8).view(np.int8)
+    known = np.where(value <= config.cells.max_free_percent, CELL_FREE, CELL_UNSURE)
+    table = np.where(
+        value < 0, CELL_UNKNOWN, np.where(value >= config.cells.min_occupied_percent, CELL_OCCUPIED, known)
+    )
+    return np.asarray(cv2.LUT(np.ascontiguousarray(cells).view(np.uint8), table.astype(np.uint8)), np.uint8)
+
+
+def _walls(wall_cells_m: Points, spacing_m: float, reach_m: float) -> tuple[Points, NearestWalls]:
+    """Return the thinned walls, and the nearest of them for each square of that side."""
+    margin = math.ceil(reach_m / spacing_m) + 1
+    if len(wall_cells_m) == 0:
+        return wall_cells_m, NearestWalls(np.zeros((1, 1), np.int32), spacing_m, margin)
+    square = np.floor(wall_cells_m / spacing_m + 1e-9).astype(np.intp) + margin
+    cols, rows = (square.max(axis=0) + margin + 1).tolist()
+    member = square[:, 1] * cols + square[:, 0]
+    count = np.bincount(member, minlength=rows * cols)
+    key = np.flatnonzero(count)
+    walls_m = thinned(wall_cells_m, spacing_m)
+    _, labels = cv2.distanceTransformWithLabels(
+        np.where(count > 0, 0, 255).astype(np.uint8).reshape(rows, cols),
+        cv2.DIST_L2,
+        cv2.DIST_MASK_5,
+        labelType=cv2.DIST_LABEL_PIXEL,
+    )
+    rank = np.zeros(len(key) + 1, np.int32)
+    rank[labels.ravel()[key]] = np.arange(len(key), dtype=np.int32)
+    return walls_m, NearestWalls(rank[labels], spacing_m, margin)
 
 
 def _centres(mask: Mask, margin: int, resolution_m: float) -> Points:
@@ -135,17 +233,9 @@ def _sampled(free: Mask, margin: int, resolution_m: float, step: int) -> Points:
     return cell_centres_m(rows * step + first, cols * step + first, resolution_m)
 
 
-def _distance_to_walls(occupied: Mask, resolution_m: float) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Distance in metres and index of the nearest occupied cell, in the order of `np.nonzero`."""
+def _distance_to_walls_m(occupied: Mask, resolution_m: float) -> NDArray[np.float32]:
     if not occupied.any():
-        shape = occupied.shape
-        return np.full(shape, np.float32(np.inf), np.float32), np.zeros(shape, np.int32)
-    distance, labels = cv2.distanceTransformWithLabels(
-        np.where(occupied, 0, 255).astype(np.uint8),
-        cv2.DIST_L2,
-        cv2.DIST_MASK_5,
-        labelType=cv2.DIST_LABEL_PIXEL,
-    )
-    rank = np.zeros(int(labels.max()) + 1, np.int32)
-    rank[labels[occupied]] = np.arange(int(np.count_nonzero(occupied)), dtype=np.int32)
-    return np.asarray(distance, np.float32) * np.float32(resolution_m), rank[labels]
+        return np.full(occupied.shape, np.float32(np.inf), np.float32)
+    free = np.where(occupied, np.uint8(0), np.uint8(255))
+    distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_5)
+    return np.asarray(distance, np.float32) * np.float32(resolution_m)

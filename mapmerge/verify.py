@@ -6,36 +6,16 @@ walls that stand in the other map's free space, and the lead over rival placemen
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
+from mapmerge.align import poses_of
 from mapmerge.config import VerifyConfig
-from mapmerge.grid import cell_centres_m
-from mapmerge.prepare import CELL_FREE, CELL_UNKNOWN, PreparedMap
-from mapmerge.sim2 import Points, Sim2
-
-
-@dataclass(frozen=True, slots=True)
-class WallAgreement:
-    """What one map's walls meet in the other map, in metres of wall.
-
-    Parameters
-    ----------
-    matched_m
-        On a wall of the other map.
-    violated_m
-        In the other map's free space, off its walls.
-    """
-
-    matched_m: float
-    violated_m: float
-
-    @property
-    def share(self) -> float:
-        """Matched share of the walls that the other map can judge; 0 if there are none."""
-        judged = self.matched_m + self.violated_m
-        return self.matched_m / judged if judged > 0 else 0.0
+from mapmerge.prepare import CELL_FREE, CELL_OCCUPIED, CELL_UNKNOWN, PreparedMap
+from mapmerge.score import agreement, probe
+from mapmerge.sim2 import Sim2
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,74 +49,56 @@ class Scores:
     violated_wall_m: float
 
 
-def wall_agreement(target: PreparedMap, walls_m: Points, spacing_m: float, tolerance_m: float) -> WallAgreement:
-    """Return what walls, one point a ``spacing_m``, given in the target's grid frame, meet in the target."""
-    tolerance_m = max(tolerance_m, target.resolution_m)
-    index = target.flat_index(walls_m)
-    matched = target.wall_distance_m.ravel()[index] <= tolerance_m
-    violated = ~matched & (target.classes.ravel()[index] == CELL_FREE)
-    return WallAgreement(float(np.count_nonzero(matched)) * spacing_m, float(np.count_nonzero(violated)) * spacing_m)
-
-
-def free_agreement_m2(target: PreparedMap, free_m: Points, spacing_m: float) -> float:
-    """Return the area of free space, given in the target's grid frame, that is free in the target as well."""
-    free = target.classes.ravel()[target.flat_index(free_m)] == CELL_FREE
-    return float(np.count_nonzero(free)) * spacing_m**2
-
-
-def rank_score_m(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, config: VerifyConfig) -> float:
-    """Return what candidates are ranked by: cheap, both directions, in metres of wall."""
-    ahead, back = _both_ways(target, source, target_from_source, config.tolerance_m)
-    free_m2 = free_agreement_m2(target, target_from_source.apply(source.free_m), source.free_spacing_m)
-    return _score(ahead, back, free_m2, config)
-
-
 def verify(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, config: VerifyConfig) -> Scores:
-    """Return all that is known of a placement."""
-    ahead, back = _both_ways(target, source, target_from_source, config.tolerance_m)
-    free_m2 = free_agreement_m2(target, target_from_source.apply(source.free_m), source.free_spacing_m)
+    """Return all that is known of a placement between the grid frames."""
+    everything = max(len(target.walls_m), len(source.walls_m), len(source.free_m), 1)
+    found = agreement(
+        target,
+        source,
+        poses_of([target_from_source]),
+        probe(source, everything, everything),
+        probe(target, everything, everything),
+    )
     agree, disagree, both = cell_agreement(target, source, target_from_source)
-    cell_m2 = source.resolution_m**2
-    smaller_m2 = min(target.grid.known_area_m2, source.grid.known_area_m2)
+    cell_m2 = (source.resolution_m * target_from_source.scale) ** 2
+    smaller_m2 = min(target.grid.known_area_m2, source.grid.known_area_m2 * target_from_source.scale**2)
+    ahead, back = found.ahead, found.back
     return Scores(
-        score_m=_score(ahead, back, free_m2, config),
+        score_m=float(found.score_m(config)[0]),
         acceptance=agree / (agree + disagree) if agree else 0.0,
         overlap_m2=both * cell_m2,
         overlap_fraction=min(1.0, both * cell_m2 / smaller_m2) if smaller_m2 > 0 else 0.0,
-        wall_agreement=min(ahead.share, back.share),
-        matched_wall_m=(ahead.matched_m + back.matched_m) / 2,
-        violated_wall_m=(ahead.violated_m + back.violated_m) / 2,
+        wall_agreement=float(min(ahead.share[0], back.share[0])),
+        matched_wall_m=float(ahead.matched_m[0] + back.matched_m[0]) / 2,
+        violated_wall_m=float(ahead.violated_m[0] + back.violated_m[0]) / 2,
     )
 
 
 def cell_agreement(target: PreparedMap, source: PreparedMap, target_from_source: Sim2) -> tuple[int, int, int]:
-    """Count the cells that agree (both occupied or both free), that disagree, and that both maps know."""
-    rows, cols = np.nonzero(source.grid.cells >= 0)
-    centres_m = cell_centres_m(rows, cols, source.resolution_m)
-    index = target.flat_index(target_from_source.apply(centres_m))
-    target_cells = np.pad(target.grid.cells, target.margin, constant_values=-1).ravel()[index]
-    there = target.classes.ravel()[index]
-    here = source.classes[rows + source.margin, cols + source.margin]
-    classed = (here != CELL_UNKNOWN) & (there != CELL_UNKNOWN)
-    agree = classed & (here == there)
-    return (
-        int(np.count_nonzero(agree)),
-        int(np.count_nonzero(classed & ~agree)),
-        int(np.count_nonzero(target_cells >= 0)),
+    """Count the cells that agree (both occupied or both free), that disagree, and that both maps know.
+
+    Each cell of the source is compared with the target's cell in which its centre lies.
+    """
+    # cv2 has integer coordinates at the centres of the cells
+    half = Sim2(0.5, 0.5)
+    ratio = target.resolution_m / source.resolution_m
+    margins_m = target.margin * target.resolution_m, source.margin * source.resolution_m
+    pose = Sim2(margins_m[0], margins_m[0]) @ target_from_source @ Sim2(-margins_m[1], -margins_m[1])
+    in_cells = replace(
+        pose, x_m=pose.x_m / target.resolution_m, y_m=pose.y_m / target.resolution_m, scale=pose.scale / ratio
     )
-
-
-def _both_ways(
-    target: PreparedMap, source: PreparedMap, target_from_source: Sim2, tolerance_m: float
-) -> tuple[WallAgreement, WallAgreement]:
-    source_from_target = target_from_source.inverse()
-    return (
-        wall_agreement(target, target_from_source.apply(source.walls_m), source.wall_spacing_m, tolerance_m),
-        wall_agreement(source, source_from_target.apply(target.walls_m), target.wall_spacing_m, tolerance_m),
+    matrix = (half.inverse() @ in_cells @ half).matrix[:2]
+    rows, cols = source.classes.shape
+    there = cv2.warpAffine(
+        target.classes,
+        matrix,
+        (cols, rows),
+        flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=CELL_UNKNOWN,
     )
-
-
-def _score(ahead: WallAgreement, back: WallAgreement, free_m2: float, config: VerifyConfig) -> float:
-    matched_m = (ahead.matched_m + back.matched_m) / 2
-    violated_m = (ahead.violated_m + back.violated_m) / 2
-    return matched_m - config.violation_weight * violated_m + config.free_weight * free_m2
+    counts = np.bincount((source.classes * np.uint8(4) + there).ravel(), minlength=16).reshape(4, 4)
+    agree = counts[CELL_FREE, CELL_FREE] + counts[CELL_OCCUPIED, CELL_OCCUPIED]
+    disagree = counts[CELL_FREE, CELL_OCCUPIED] + counts[CELL_OCCUPIED, CELL_FREE]
+    known = counts[1:, 1:].sum()
+    return int(agree), int(disagree), int(known)

@@ -8,6 +8,7 @@ from typing import Protocol, TypeVar
 from mapmerge.config import MergeConfig
 from mapmerge.evidence import Evidence
 from mapmerge.grid import Grid
+from mapmerge.match.cues import Cues
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason
 from mapmerge.sim2 import Sim2
@@ -48,6 +49,8 @@ class Match:
         What decided.
     confidence
         Calibrated probability that the placement is right; None where the method states none.
+    cues
+        The figures that the confidence was computed from.
     rivals
         Distinct placements of the same pair, best first.
     evidence
@@ -59,6 +62,7 @@ class Match:
     accepted: bool
     reason: Reason
     confidence: float | None = None
+    cues: Cues | None = None
     rivals: tuple[Rival, ...] = ()
     evidence: tuple[Evidence, ...] = ()
 

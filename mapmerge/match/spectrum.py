@@ -7,16 +7,22 @@ spectra of two maps of one place are the same but for their turn.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mapmerge.sim2 import Points
 
 Spectrum = NDArray[np.float64]
+Spectra = NDArray[np.float64]
 
 
-def orientation_spectrum(walls_m: Points, angle_step_rad: float, bin_m: float) -> Spectrum:
-    """Return the Radon energy of the walls for angles from 0 to π, shape (A,), with mean 0 and norm 1.
+def orientation_spectra(walls_m: Points, angle_step_rad: float, bin_m: float) -> Spectra:
+    """Return two spectra of the walls for angles from 0 to π, shape (2, A), each with mean 0 and norm 1.
+
+    The first sums the fourth power of the projections, so that a few long straight walls decide; the second the square,
+    the energy of the Radon transform, to which all walls contribute.
 
     Parameters
     ----------
@@ -29,19 +35,20 @@ def orientation_spectrum(walls_m: Points, angle_step_rad: float, bin_m: float) -
     """
     angles = max(1, round(np.pi / angle_step_rad))
     if len(walls_m) < 2:
-        return np.zeros(angles)
-    centred = walls_m - walls_m.mean(axis=0)
-    reach_m = float(np.hypot(centred[:, 0], centred[:, 1]).max())
-    bins = int(np.ceil(2 * reach_m / bin_m)) + 2
-    energy = np.empty(angles)
+        return np.zeros((2, angles))
+    centred = (walls_m - walls_m.mean(axis=0)) / bin_m
+    reach = float(np.hypot(centred[:, 0], centred[:, 1]).max())
+    bins = math.ceil(2 * reach) + 2
+    spectra = np.empty((2, angles))
     for index, angle in enumerate(np.arange(angles) * np.pi / angles):
-        offset_m = centred @ (np.cos(angle), np.sin(angle))
-        counts = np.bincount(((offset_m + reach_m) / bin_m).astype(np.intp), minlength=bins)
+        offset = centred @ (math.cos(angle), math.sin(angle)) + reach
+        counts = np.bincount(offset.astype(np.intp), minlength=bins)
         # neighbouring bins are summed so that a wall on the border of two bins counts in full
-        energy[index] = np.square(counts[:-1] + counts[1:], dtype=np.float64).sum()
-    energy -= energy.mean()
-    norm = float(np.linalg.norm(energy))
-    return energy / norm if norm > 0 else energy
+        square = np.square(counts[:-1] + counts[1:], dtype=np.float64)
+        spectra[:, index] = square @ square, square.sum()
+    spectra -= spectra.mean(axis=1, keepdims=True)
+    norm = np.linalg.norm(spectra, axis=1, keepdims=True)
+    return spectra / np.where(norm > 0, norm, 1.0)
 
 
 def spectrum_correlation(target: Spectrum, source: Spectrum) -> Spectrum:

@@ -2,108 +2,164 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.config import SearchConfig
+from mapmerge.align import Poses
 from mapmerge.prepare import PreparedMap
 from mapmerge.sim2 import Points, Sim2
 
 Surface = NDArray[np.float32]
-
-
-@dataclass(frozen=True, slots=True)
-class Peak:
-    """A candidate: where the source would lie, and the value of the correlation there."""
-
-    target_from_source: Sim2
-    value: float
+Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CorrelationSurface:
-    """Score of every shift for one rotation, as found; evidence for the reader.
+    """Score of every shift for one rotation.
 
     Parameters
     ----------
-    yaw_rad
-        The rotation.
+    turn
+        The rotation, and the scale.
     values
-        Shape (rows, columns): score in metres of wall; a row or column is one step of the shift in y or x.
+        Shape (rows, columns): score in metres of wall; a row or column is one step of the shift in y or x. Shifts are
+        cyclic: those of the later half are negative.
     origin_m
         The shift of the first value.
     step_m
         Shift between two values.
     """
 
-    yaw_rad: float
+    turn: Sim2
     values: Surface
     origin_m: tuple[float, float]
     step_m: float
 
+    def shift_m(self, rows: Indices, cols: Indices) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the shifts in x and y of some values."""
+        height, width = self.values.shape
+        x = np.where(cols < (width + 1) // 2, cols, cols - width) * self.step_m
+        y = np.where(rows < (height + 1) // 2, rows, rows - height) * self.step_m
+        return x + self.origin_m[0], y + self.origin_m[1]
+
+    def centred(self) -> Surface:
+        """Return the values with the most negative shifts first."""
+        return np.fft.fftshift(self.values)
+
+    def centred_index(self, target_from_source: Sim2) -> tuple[int, int]:
+        """Return row and column in `centred` of the shift that is nearest to that of a placement."""
+        height, width = self.values.shape
+        row = round((target_from_source.y_m - self.origin_m[1]) / self.step_m)
+        col = round((target_from_source.x_m - self.origin_m[0]) / self.step_m)
+        return row + height // 2, col + width // 2
+
 
 class TranslationSearch:
-    """Correlates one target map with turned sources: the target's transforms are computed once."""
+    """Correlates one target map with turned sources: the target's transforms are computed once.
 
-    def __init__(self, target: PreparedMap, source: PreparedMap, config: SearchConfig) -> None:
-        self._config = config
-        self._source = source
-        self._reach_m = float(np.hypot(*source.extent_m))
+    Parameters
+    ----------
+    target, source
+        The maps.
+    cell_m
+        Side of the cells of the coarse maps; larger where the target has larger cells, or would need more than
+        ``max_side_cells`` of them.
+    max_side_cells
+        Most cells a side.
+    free_weights
+        What a wall of either map in the other's free space costs, against 1 for a wall on a wall: there is a surface
+        for each of these.
+    largest_scale
+        Largest scale of the source that is asked for.
+    """
+
+    def __init__(
+        self,
+        target: PreparedMap,
+        source: PreparedMap,
+        cell_m: float,
+        max_side_cells: int,
+        free_weights: tuple[float, ...],
+        largest_scale: float = 1.0,
+    ) -> None:
+        self._walls_m, self._free_m = source.walls_m, source.free_m
+        self._wall_spacing_m = source.wall_spacing_m
+        self._reach_m = largest_scale * float(np.hypot(*source.extent_m))
         sides_m = [side_m + self._reach_m for side_m in target.extent_m]
-        self._cell_m = max(config.cell_m, target.resolution_m, max(sides_m) / config.max_side_cells)
-        cols, rows = (int(np.ceil(side_m / self._cell_m)) + 4 for side_m in sides_m)
+        self._cell_m = max(cell_m, target.resolution_m, max(sides_m) / max_side_cells)
+        cols, rows = (math.ceil(side_m / self._cell_m) + 4 for side_m in sides_m)
         self._shape = (cv2.getOptimalDFTSize(rows), cv2.getOptimalDFTSize(cols))
-        walls = cv2.GaussianBlur(self._raster(target.walls_m), (3, 3), 0.0)
-        free = self._raster(target.free_m).astype(bool).astype(np.float32)
-        self._walls_spectrum = np.fft.rfft2(walls)
-        self._cost_spectrum = np.fft.rfft2(walls - config.free_weight * free)
+        walls, free = self._rasters(target.walls_m, target.free_m)
+        walls_spectrum, free_spectrum = cv2.dft(cv2.GaussianBlur(walls, (3, 3), 0.0)), cv2.dft(free)
+        # what the source's walls meet, and what its free space meets
+        self._spectra = [
+            (walls_spectrum - np.float32(weight) * free_spectrum, np.float32(-weight) * walls_spectrum)
+            for weight in free_weights
+        ]
 
-    def surface(self, yaw_rad: float) -> CorrelationSurface:
-        """Return the score of every shift of the source turned by this angle.
+    def surfaces(self, turn: Sim2) -> tuple[CorrelationSurface, ...]:
+        """Return the scores of every shift of the source turned, and scaled, by ``turn``, for each free weight.
 
-        A wall on a wall counts 1 a metre, a wall of either map in the other's free space costs
-        `SearchConfig.free_weight`.
+        They are followed by those of the source turned by another 180°, whose transforms are the same.
         """
-        turn = Sim2(yaw_rad=yaw_rad)
-        walls_m, free_m = turn.apply(self._source.walls_m), turn.apply(self._source.free_m)
+        walls_m, free_m = turn.apply(self._walls_m), turn.apply(self._free_m)
         low = np.vstack([walls_m, free_m]).min(axis=0, initial=self._reach_m)
-        walls = self._raster(walls_m - low)
-        free = self._raster(free_m - low).astype(bool).astype(np.float32)
-        product = self._cost_spectrum * np.conj(np.fft.rfft2(walls))
-        product -= self._config.free_weight * self._walls_spectrum * np.conj(np.fft.rfft2(free))
-        values = np.fft.irfft2(product, self._shape).astype(np.float32)
-        # shifts are cyclic: roll so that the most negative one comes first
-        back = tuple(min(size - 1, int(np.ceil(self._reach_m / self._cell_m)) + 2) for size in self._shape)
-        cell_m = self._cell_m
-        origin_m = (-back[1] * cell_m - float(low[0]), -back[0] * cell_m - float(low[1]))
-        scale = np.float32(self._source.wall_spacing_m)
-        return CorrelationSurface(yaw_rad, np.roll(values, back, axis=(0, 1)) * scale, origin_m, cell_m)
+        rasters = self._rasters(walls_m - low, free_m - low)
+        length_m = np.float32(self._wall_spacing_m * turn.scale)
+        walls, free = (np.asarray(cv2.dft(raster * length_m), np.float32) for raster in rasters)
+        low_x_m, low_y_m = low.tolist()
+        half = Sim2(0.0, 0.0, turn.yaw_rad + math.pi, turn.scale)
+        ahead = [
+            CorrelationSurface(turn, _correlated(spectra, (walls, free), True), (-low_x_m, -low_y_m), self._cell_m)
+            for spectra in self._spectra
+        ]
+        # turned by 180°, cell k becomes cell −k, whose far corner is the near one of before
+        corner = (low_x_m + self._cell_m, low_y_m + self._cell_m)
+        back = [
+            CorrelationSurface(half, _correlated(spectra, (walls, free), False), corner, self._cell_m)
+            for spectra in self._spectra
+        ]
+        return (*ahead, *back)
+
+    def _rasters(self, walls_m: Points, free_m: Points) -> tuple[Surface, Surface]:
+        """Return the count of walls, and which cells are free and not beside a wall, where a cell tells nothing."""
+        walls = self._raster(walls_m)
+        free = np.minimum(self._raster(free_m), np.float32(1.0))
+        free[cv2.dilate(walls, np.ones((3, 3), np.uint8)) > 0] = 0.0
+        return walls, free
 
     def _raster(self, points_m: Points) -> Surface:
         rows, cols = self._shape
-        cell = np.floor(points_m / self._cell_m).astype(np.intp)
+        cell = (points_m * (1.0 / self._cell_m)).astype(np.intp)
         index = np.clip(cell[:, 1], 0, rows - 1) * cols + np.clip(cell[:, 0], 0, cols - 1)
         return np.bincount(index, minlength=rows * cols).astype(np.float32).reshape(rows, cols)
 
 
-def surface_peaks(surface: CorrelationSurface, config: SearchConfig) -> list[Peak]:
-    """Return the best `SearchConfig.shifts` shifts that are local maxima, best first."""
-    reach = max(1, round(config.peak_distance_m / surface.step_m))
+def surface_peaks(surface: CorrelationSurface, peak_distance_m: float) -> tuple[Poses, NDArray[np.float32]]:
+    """Return the shifts that are local maxima, and their values, best first.
+
+    Parameters
+    ----------
+    surface
+        Scores of one rotation.
+    peak_distance_m
+        Least distance of two peaks.
+    """
+    reach = max(1, round(peak_distance_m / surface.step_m))
     highest = cv2.dilate(surface.values, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
     rows, cols = np.nonzero((surface.values >= highest) & (surface.values > 0))
-    values = surface.values[rows, cols]
-    order = np.argsort(-values, kind="stable")[: config.shifts]
-    return [
-        Peak(
-            Sim2(
-                surface.origin_m[0] + int(cols[i]) * surface.step_m,
-                surface.origin_m[1] + int(rows[i]) * surface.step_m,
-                surface.yaw_rad,
-            ),
-            float(values[i]),
-        )
-        for i in order
-    ]
+    order = np.argsort(-surface.values[rows, cols], kind="stable")
+    rows, cols = rows[order], cols[order]
+    poses = np.empty((len(rows), 4))
+    poses[:, 0], poses[:, 1] = surface.shift_m(rows, cols)
+    poses[:, 2:] = surface.turn.yaw_rad, surface.turn.scale
+    return poses, surface.values[rows, cols]
+
+
+def _correlated(target: tuple[Surface, Surface], source: tuple[Surface, Surface], conjugate: bool) -> Surface:
+    walls, free = (cv2.mulSpectrums(one, other, 0, conjB=conjugate) for one, other in zip(target, source, strict=True))
+    return np.asarray(cv2.idft(walls + free, flags=cv2.DFT_REAL_OUTPUT | cv2.DFT_SCALE), np.float32)

@@ -1,10 +1,7 @@
-"""Alignment of a candidate placement: ICP on the walls (paper, equations 23 and 24), against a distance transform.
+"""Alignment of a placement to a fraction of a cell.
 
-The nearest wall of a point is a look-up in the target's labelled distance transform, so a step costs one pass over
-the points. Pairs beyond a distance that narrows are left out: plain ICP pulls good alignments away.
-
-ICP on cell centres cannot tell where in a cell it ends. `polish` can: it maximises the correlation of both maps' walls,
-each blurred by about a cell, which is smooth and treats the two maps alike.
+ICP cannot tell where in a cell it ends. `polish` can: it maximises the correlation of both maps' walls, each blurred by
+about a cell, which is smooth and treats the two maps alike.
 """
 
 from __future__ import annotations
@@ -14,37 +11,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from mapmerge.align import evenly
 from mapmerge.config import RefineConfig
 from mapmerge.prepare import CELL_OCCUPIED, PreparedMap
 from mapmerge.sim2 import Points, Sim2
 
-_CONVERGED_M = 1e-4
-_CONVERGED_RAD = 1e-5
+_CONVERGED_M = 2e-4
+_CONVERGED_RAD = 2e-5
 _MIN_PAIRS = 12
-
-
-def refine(target: PreparedMap, walls_m: Points, start: Sim2, config: RefineConfig) -> Sim2:
-    """Return ``target_from_source`` that aligns the source's walls with the target's, searched from ``start``.
-
-    Parameters
-    ----------
-    target
-        The map that stays.
-    walls_m
-        Wall points of the source in its grid frame, shape (N, 2).
-    start
-        Candidate ``target_from_source``; its scale is kept.
-    """
-    pose = start
-    for reject_m in config.reject_m:
-        for _ in range(config.iterations):
-            step = _icp_step(target, pose.apply(walls_m), reject_m)
-            if step is None:
-                return pose
-            pose = step @ pose
-            if _is_still(step):
-                break
-    return pose
 
 
 def polish(target: PreparedMap, wall_cells_m: Points, start: Sim2, config: RefineConfig) -> Sim2:
@@ -57,7 +31,7 @@ def polish(target: PreparedMap, wall_cells_m: Points, start: Sim2, config: Refin
     wall_cells_m
         Centres of the source's occupied cells in its grid frame, shape (N, 2).
     start
-        ``target_from_source`` that `refine` returned.
+        ``target_from_source`` that ICP returned; its scale is kept.
     """
     cells_m = evenly(wall_cells_m, config.max_polish_points)
     pose = start
@@ -69,35 +43,6 @@ def polish(target: PreparedMap, wall_cells_m: Points, start: Sim2, config: Refin
         if _is_still(step):
             break
     return pose
-
-
-def evenly(points_m: Points, most: int) -> Points:
-    """Return at most so many of the points, evenly spread over their order."""
-    if len(points_m) <= most:
-        return points_m
-    chosen: NDArray[np.intp] = np.linspace(0, len(points_m) - 1, most).astype(np.intp)
-    return points_m[chosen]
-
-
-def _icp_step(target: PreparedMap, points_m: Points, reject_m: float) -> Sim2 | None:
-    """One step: pair each point with the nearest wall and return the rigid motion that brings them together.
-
-    The motion is that of least squares with the error of each pair taken along the line from the wall to the point,
-    which on straight walls is their normal: points slide along walls freely, so few steps are enough.
-    """
-    index = target.flat_index(points_m)
-    near = target.wall_distance_m.ravel()[index] <= reject_m
-    if int(np.count_nonzero(near)) < _MIN_PAIRS:
-        return None
-    points, index = points_m[near], index[near]
-    walls = target.wall_cells_m
-    nearest = 0.5 * (walls[target.nearest_wall.ravel()[index]] + walls[target.nearest_wall_too.ravel()[index]])
-    error = nearest - points
-    distance = np.hypot(error[:, 0], error[:, 1])
-    # Cauchy weights: what is far apart says less
-    weight = 1.0 / (1.0 + np.square(distance / (0.35 * reject_m)))
-    centre = points.mean(axis=0)
-    return _rigid_motion(points - centre, error, weight, centre)
 
 
 def _blurred_step(target: PreparedMap, points_m: Points, blur_cells: float) -> Sim2 | None:

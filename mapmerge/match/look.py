@@ -1,0 +1,126 @@
+"""A look at a pair: candidates aligned and ranked, and what competes with the best of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapmerge.align import Poses, align, evenly, placed
+from mapmerge.config import MergeConfig, VerifyConfig
+from mapmerge.match.pair import PairOfMaps
+from mapmerge.score import agreement, probe
+from mapmerge.sim2 import wrap_angle
+
+_SAME_M, _SAME_RAD = 0.3, math.radians(2.0)
+_BESIDE = 1.2
+_BESIDE_TURNS = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """Aligned placements between the grid frames, best first.
+
+    Parameters
+    ----------
+    poses
+        Shape (C, 4).
+    scores_m
+        Their scores, see `VerifyConfig.violation_weight`, shape (C,).
+    """
+
+    poses: Poses
+    scores_m: NDArray[np.float64]
+
+    def joined(self, other: Look) -> Look:
+        """Return the placements of both, best first."""
+        return _best_first(np.vstack([self.poses, other.poses]), np.concatenate([self.scores_m, other.scores_m]))
+
+
+def look(pair: PairOfMaps, starts: Poses, scales: tuple[float, float], config: MergeConfig) -> Look:
+    """Return the candidates, aligned in two passes: all roughly, the best of them well.
+
+    Parameters
+    ----------
+    pair
+        The maps.
+    starts
+        Where to begin, shape (C, 4).
+    scales
+        Least and largest scale.
+    config
+        Settings.
+    """
+    target, source, limits = pair.target.map, pair.source.map, config.refine
+    poses = align(target, evenly(source.walls_m, limits.rough_points), starts, limits.rough_reject_m, scales=scales)
+    poses = poses[pair.allowed(poses)]
+    if len(poses) == 0:
+        return Look(poses, np.empty(0))
+    few = limits.rough_probes
+    rough = agreement(target, source, poses, probe(source, few, few), probe(target, few, few))
+    poses = poses[np.argsort(-rough.score_m(config.verify), kind="stable")]
+    poses = poses[distinct(poses, source.walls_m, _SAME_M, _SAME_RAD, limits.survivors)]
+    poses = align(target, evenly(source.walls_m, limits.points), poses, limits.reject_m, scales=scales)
+    poses = poses[pair.allowed(poses)]
+    return _best_first(poses, scored(pair, poses, config))
+
+
+def beside(pair: PairOfMaps, pose: Poses, scales: tuple[float, float], config: MergeConfig) -> Look:
+    """Return what is found from starts beside a placement, shape (1, 4).
+
+    Along walls without an end the score has a ridge but no second peak, so that no peak of a surface is a rival there.
+    """
+    reach_m = _BESIDE * config.verify.distinct_m
+    angles = np.arange(_BESIDE_TURNS) * math.tau / _BESIDE_TURNS
+    starts = np.repeat(pose, _BESIDE_TURNS, axis=0)
+    starts[:, 0] += reach_m * np.cos(angles)
+    starts[:, 1] += reach_m * np.sin(angles)
+    limits = config.refine
+    walls_m = evenly(pair.source.map.walls_m, limits.rough_points)
+    poses = align(pair.target.map, walls_m, starts, limits.rough_reject_m, scales=scales)
+    poses = poses[pair.allowed(poses)]
+    return _best_first(poses, scored(pair, poses, config))
+
+
+def scored(pair: PairOfMaps, poses: Poses, config: MergeConfig) -> NDArray[np.float64]:
+    """Return the scores of placements, shape (C,), from as many points as are used for the best ones."""
+    target, source, most = pair.target.map, pair.source.map, config.refine.probes
+    found = agreement(target, source, poses, probe(source, most, most // 2), probe(target, most, most // 2))
+    return found.score_m(config.verify)
+
+
+def rivals(found: Look, pair: PairOfMaps, config: VerifyConfig) -> Look:
+    """Return the placements, best first, each of which differs from the best one and from all better ones."""
+    kept = distinct(found.poses, pair.source.map.walls_m, config.distinct_m, config.distinct_rad, len(found.poses))[1:]
+    return Look(found.poses[kept], found.scores_m[kept])
+
+
+def distinct(poses: Poses, walls_m: NDArray[np.float64], distance_m: float, angle_rad: float, most: int) -> list[int]:
+    """Return the rows, in order and at most so many, each of which differs from all that are kept before it.
+
+    Placements differ if they take the middle of the walls further apart, turn further apart, or scale by a twentieth.
+    """
+    x, y = (values[:, 0].tolist() for values in placed(poses, walls_m.mean(axis=0)[None]))
+    turns, sizes = poses[:, 2].tolist(), np.log(poses[:, 3]).tolist()
+    kept: list[int] = []
+    for row in range(len(poses)):
+        if len(kept) == most:
+            break
+        if all(
+            math.hypot(x[row] - x[other], y[row] - y[other]) > distance_m
+            or abs(wrap_angle(turns[row] - turns[other])) > angle_rad
+            or abs(sizes[row] - sizes[other]) > _DISTINCT_SIZE
+            for other in kept
+        ):
+            kept.append(row)
+    return kept
+
+
+_DISTINCT_SIZE = 0.05
+
+
+def _best_first(poses: Poses, scores_m: NDArray[np.float64]) -> Look:
+    order = np.argsort(-scores_m, kind="stable")
+    return Look(poses[order], scores_m[order])

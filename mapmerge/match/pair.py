@@ -1,0 +1,87 @@
+"""Two maps that are matched, and which placements are allowed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapmerge.align import Poses, composed, inverses, poses_of
+from mapmerge.match.spectrum import Spectra
+from mapmerge.prepare import PreparedMap
+from mapmerge.prior import WITHIN_SIGMAS, Prior
+from mapmerge.sim2 import Sim2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DescribedMap:
+    """A map with its orientation spectra."""
+
+    map: PreparedMap
+    spectra: Spectra
+
+    @property
+    def wall_m(self) -> float:
+        """Length of its walls."""
+        return len(self.map.walls_m) * self.map.wall_spacing_m
+
+    def comes_before(self, other: DescribedMap) -> bool:
+        """Tell which of two maps is the source whatever order they are given in, so that the outcome is symmetric.
+
+        It is the smaller one, which costs less.
+        """
+        mine, others = self.map.grid, other.map.grid
+        key, other_key = (mine.known_area_m2, *mine.cells.shape), (others.known_area_m2, *others.cells.shape)
+        return key < other_key or (key == other_key and mine.cells.tobytes() < others.cells.tobytes())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairOfMaps:
+    """Two maps in the order in which they are matched.
+
+    Parameters
+    ----------
+    target, source
+        The map that stays, and the one that is placed.
+    prior
+        What is believed of their placement; None if nothing is.
+    swapped
+        Whether the prior is of the source from the target.
+    """
+
+    target: DescribedMap
+    source: DescribedMap
+    prior: Prior | None = None
+    swapped: bool = False
+
+    def between_maps(self, target_from_source: Sim2) -> Sim2:
+        """Return a placement between grid frames as one between map frames."""
+        target, source = self.target.map.grid, self.source.map.grid
+        return target.map_from_grid @ target_from_source @ source.map_from_grid.inverse()
+
+    def between_grids(self, target_from_source: Sim2) -> Sim2:
+        """Return a placement between map frames as one between grid frames."""
+        target, source = self.target.map.grid, self.source.map.grid
+        return target.map_from_grid.inverse() @ target_from_source @ source.map_from_grid
+
+    @property
+    def believed(self) -> Sim2 | None:
+        """The prior's placement between the grid frames."""
+        if self.prior is None:
+            return None
+        pose = self.prior.target_from_source
+        return self.between_grids(pose.inverse() if self.swapped else pose)
+
+    def allowed(self, poses: Poses, slack_m: float = 0.0, slack_rad: float = 0.0) -> NDArray[np.bool_]:
+        """Tell which placements between grid frames, shape (C, 4), lie within the prior, or so near to it."""
+        if self.prior is None:
+            return np.ones(len(poses), np.bool_)
+        target, source = self.target.map.grid.map_from_grid, self.source.map.grid.map_from_grid.inverse()
+        moved = composed(composed(poses_of([target]), poses), poses_of([source]))
+        if self.swapped:
+            moved = inverses(moved)
+        off = np.abs(moved[:, :3] - poses_of([self.prior.target_from_source])[:, :3])
+        off[:, 2] = np.abs(np.remainder(off[:, 2] + np.pi, 2 * np.pi) - np.pi)
+        sigmas = np.array([self.prior.sigma_x_m, self.prior.sigma_y_m, self.prior.sigma_yaw_rad])
+        return np.asarray((off <= WITHIN_SIGMAS * sigmas + (slack_m, slack_m, slack_rad)).all(axis=1), np.bool_)

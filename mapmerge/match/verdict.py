@@ -1,0 +1,83 @@
+"""Whether a placement is accepted and, in words, why or why not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from mapmerge.config import VerifyConfig
+from mapmerge.match.base import Match, Rival
+from mapmerge.match.cues import Cues
+from mapmerge.match.pair import DescribedMap, PairOfMaps
+from mapmerge.prior import Prior
+from mapmerge.reasons import Reason, ReasonCode
+from mapmerge.verify import Scores
+
+
+def too_little_structure(target: DescribedMap, source: DescribedMap, config: VerifyConfig) -> Reason | None:
+    """Return a refusal if one of the maps has fewer walls than a placement must match."""
+    least_m = min(target.wall_m, source.wall_m)
+    if least_m >= config.min_matched_wall_m:
+        return None
+    message = f"one of the maps shows {_down(least_m, 1):.1f} m of wall, less than {config.min_matched_wall_m:g} m"
+    return Reason(ReasonCode.TOO_LITTLE_STRUCTURE, message)
+
+
+def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig) -> Reason:
+    """Return why a placement is accepted or, what speaks most against it first, why not."""
+    for what, found, least, unit in (
+        ("m² of ground", scores.overlap_m2, config.min_overlap_m2, "m²"),
+        ("m of wall", scores.matched_wall_m, config.min_matched_wall_m, "m"),
+    ):
+        if found < least:
+            message = f"the maps share {_down(found, 1):.1f} {what}, less than {least:g} {unit}"
+            return Reason(ReasonCode.TOO_LITTLE_OVERLAP, message)
+    if confidence >= config.min_confidence:
+        message = (
+            f"{scores.overlap_m2:.0f} m² overlap, walls agree {scores.wall_agreement:.2f}, "
+            f"next best placement {cues.likeness:.2f} times as good"
+        )
+        return Reason(ReasonCode.ACCEPTED, message)
+    doubt = f"its confidence is {_percent(confidence)}, less than {_percent(config.min_confidence)}"
+    if scores.score_m <= 0.0 or scores.wall_agreement < config.poor_agreement:
+        message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree; {doubt}"
+        return Reason(ReasonCode.WALLS_DISAGREE, message)
+    if cues.likeness > config.rival_likeness:
+        message = f"another placement is {cues.likeness:.2f} times as good as the best one; {doubt}"
+        return Reason(ReasonCode.AMBIGUOUS, message)
+    message = (
+        f"only {scores.overlap_m2:.0f} m² overlap with {scores.matched_wall_m:.0f} m of wall, of which "
+        f"{_down(scores.wall_agreement, 2):.0%} agrees; {doubt}"
+    )
+    return Reason(ReasonCode.LOW_CONFIDENCE, message)
+
+
+def contradicted(match: Match, elsewhere: Match, prior: Prior, pair: PairOfMaps) -> Match:
+    """Return the refusal of a prior that the maps contradict: both placements are shown."""
+    if match.target_from_source is None:
+        believed = prior.target_from_source
+        match = replace(match, target_from_source=believed.inverse() if pair.swapped else believed)
+    if elsewhere.target_from_source is None or elsewhere.scores is None:
+        return match
+    true = elsewhere.target_from_source.inverse() if pair.swapped else elsewhere.target_from_source
+    message = (
+        f"the placement {prior.origin} does not fit: {match.reason.message}; the maps fit at x {true.x_m:.2f} m, "
+        f"y {true.y_m:.2f} m, yaw {true.yaw_rad:.3f} rad"
+    )
+    return replace(
+        match,
+        reason=Reason(ReasonCode.PRIOR_CONTRADICTED, message),
+        rivals=(Rival(elsewhere.target_from_source, elsewhere.scores.score_m), *match.rivals),
+    )
+
+
+def _percent(share: float) -> str:
+    """Return a share near 1 with as many digits as tell it from 1."""
+    if share >= 0.99995:
+        return "over 99.99 %"
+    return f"{_down(share * 100, 2 if share > 0.9 else 0):g} %"
+
+
+def _down(value: float, digits: int) -> float:
+    """Round down, so that what is less than a limit reads like that."""
+    return math.floor(value * 10.0**digits) / 10.0**digits

@@ -1,0 +1,131 @@
+"""What many candidate placements are ranked by: walls and free space that agree or contradict, in both directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapmerge.align import Poses, evenly, inverses, placed
+from mapmerge.config import VerifyConfig
+from mapmerge.prepare import MEETS_FREE, MEETS_NEAR, MEETS_WALL, PreparedMap
+from mapmerge.sim2 import Points
+
+Lengths = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Probe:
+    """Points of a map that are looked up in another.
+
+    Parameters
+    ----------
+    walls_m, free_m
+        Points on walls and in free space, in the map's grid frame, shapes (N, 2) and (K, 2).
+    wall_m, free_m2
+        Length of wall and area of free space that one of them stands for.
+    """
+
+    walls_m: Points
+    free_m: Points
+    wall_m: float
+    free_m2: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tally:
+    """What one map's walls meet in the other, for each of C placements, in metres of wall: shape (C,) each.
+
+    Parameters
+    ----------
+    matched_m
+        On a wall.
+    near_m
+        In free space, off the walls, but not far.
+    far_m
+        Amid free space: a contradiction.
+    """
+
+    matched_m: Lengths
+    near_m: Lengths
+    far_m: Lengths
+
+    @property
+    def violated_m(self) -> Lengths:
+        """In free space, near walls or far from them."""
+        return self.near_m + self.far_m
+
+    @property
+    def share(self) -> Lengths:
+        """Matched share of the walls that the other map can judge; 0 if there are none."""
+        judged = self.matched_m + self.violated_m
+        return np.where(judged > 0, self.matched_m / np.maximum(judged, 1e-12), 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Agreement:
+    """Both directions, and the free space that agrees, for each of C placements."""
+
+    ahead: Tally
+    back: Tally
+    free_m2: Lengths
+
+    def score_m(self, config: VerifyConfig) -> Lengths:
+        """Return what placements are ranked by, see `VerifyConfig.violation_weight`."""
+        matched_m = (self.ahead.matched_m + self.back.matched_m) / 2
+        violated_m = (self.ahead.violated_m + self.back.violated_m) / 2
+        return matched_m - config.violation_weight * violated_m + config.free_weight * self.free_m2
+
+
+def probe(prepared: PreparedMap, most_walls: int, most_free: int) -> Probe:
+    """Return at most so many points of a map, evenly spread."""
+    walls_m, free_m = evenly(prepared.walls_m, most_walls), evenly(prepared.free_m, most_free)
+    return Probe(
+        walls_m,
+        free_m,
+        prepared.wall_spacing_m * len(prepared.walls_m) / max(len(walls_m), 1),
+        prepared.free_spacing_m**2 * len(prepared.free_m) / max(len(free_m), 1),
+    )
+
+
+def agreement(target: PreparedMap, source: PreparedMap, poses: Poses, ahead: Probe, back: Probe) -> Agreement:
+    """Return how well two maps agree at each placement.
+
+    Parameters
+    ----------
+    target, source
+        The maps.
+    poses
+        ``target_from_source`` between the grid frames, shape (C, 4).
+    ahead, back
+        Points of the source and of the target.
+    """
+    inverse = inverses(poses)
+    return Agreement(
+        _tally(_met(target, poses, ahead.walls_m), ahead.wall_m * poses[:, 3]),
+        _tally(_met(source, inverse, back.walls_m), back.wall_m),
+        np.count_nonzero(_met(target, poses, ahead.free_m) & MEETS_FREE, axis=1) * ahead.free_m2 * poses[:, 3] ** 2,
+    )
+
+
+def _met(prepared: PreparedMap, poses: Poses, points_m: Points) -> NDArray[np.uint8]:
+    """Return `PreparedMap.meets` at points placed on the map, shape (C, N)."""
+    x, y = placed(poses, points_m)
+    rows, cols = prepared.meets.shape
+    inverse, margin = np.float32(1.0 / prepared.resolution_m), np.float32(prepared.margin)
+    col = np.clip((x * inverse + margin).astype(np.int32), 0, cols - 1)
+    row = np.clip((y * inverse + margin).astype(np.int32), 0, rows - 1)
+    found: NDArray[np.uint8] = prepared.meets.ravel()[row * cols + col]
+    return found
+
+
+def _tally(met: NDArray[np.uint8], wall_m: float | Lengths) -> Tally:
+    def length_m(mask: int, value: int) -> Lengths:
+        return np.asarray(np.count_nonzero((met & mask) == value, axis=1) * wall_m, np.float64)
+
+    return Tally(
+        matched_m=length_m(MEETS_WALL, MEETS_WALL),
+        near_m=length_m(MEETS_FREE | MEETS_NEAR | MEETS_WALL, MEETS_FREE | MEETS_NEAR),
+        far_m=length_m(MEETS_FREE | MEETS_NEAR | MEETS_WALL, MEETS_FREE),
+    )
