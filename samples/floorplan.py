@@ -7,21 +7,17 @@ corridors makes every room reachable, and a few more doors close loops.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapmerge.sim2 import Points, Sim2
 from samples.furniture import furnish
-from samples.world import CLEAR_GLASS, Box, Door, Edges, Rng, Room, World, polygon_edges, rectangle
+from samples.walls import TOUCHING_M, WallStyle, door_edges, room_walls
+from samples.world import CLEAR_GLASS, Box, Door, Rng, Room, World, polygon_edges
 
 CORRIDOR = "corridor"
-_TOUCHING_M = 1e-6
 _NARROWEST_DOORWAY_M = 1.3
-
-Interval = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,14 +53,19 @@ class FloorStyle:
     furniture: float = 1.0
     window_share: float = 0.3
 
+    @property
+    def walls(self) -> WallStyle:
+        """What the walls are made of."""
+        return WallStyle(self.wall_m, self.window_share)
+
 
 def office_floor(seed: int, style: FloorStyle | None = None) -> World:
     """Return a random floor; the same seed and style give the same floor."""
     style = style or FloorStyle()
     layout, doorways, indoors = (np.random.default_rng([seed, part]) for part in range(3))
     extent = Box(0.0, 0.0, style.width_m, style.height_m)
-    rooms = _without_a_corner(_split(extent, style, layout), extent, layout)
-    doors = _choose_doors(rooms, style, doorways)
+    rooms = _without_a_corner(split_into_rooms(extent, style, layout), extent, layout)
+    doors = choose_doors(rooms, style, doorways)
     return build_world(extent, rooms, doors, style, indoors)
 
 
@@ -86,12 +87,13 @@ def look_alike_corridor(bays: int, bay_m: float = 4.0, style: FloorStyle | None 
 
 def build_world(extent: Box, rooms: Sequence[Room], doors: Sequence[Door], style: FloorStyle, rng: Rng) -> World:
     """Return the world with these rooms and doors, furnished."""
-    walls = [_room_walls(index, rooms, doors, style, rng) for index in range(len(rooms))]
-    solid = [edges for edges, _ in walls] + [_door_edges(door, style.wall_m) for door in doors]
+    walls = [room_walls(index, rooms, doors, style.walls, rng) for index in range(len(rooms))]
+    solid = [edges for edges, _ in walls] + [door_edges(door, style.wall_m) for door in doors]
     for index, room in enumerate(rooms):
         clear = [_clear_of(door) for door in doors if index in door.rooms]
         inside = Room(room.kind, room.box.grown(-0.5 * style.wall_m))
-        solid += [polygon_edges(polygon) for polygon in furnish(inside, clear, style.furniture, rng)]
+        for placed in furnish(inside, clear, style.furniture, rng):
+            solid += [polygon_edges(polygon) for polygon in placed.polygons]
     glass = [edges for _, edges in walls]
     opaque, clear_edges = np.vstack(solid), np.vstack(glass)
     opacity = np.concatenate([np.ones(len(opaque)), np.full(len(clear_edges), CLEAR_GLASS)])
@@ -106,19 +108,20 @@ def _clear_of(door: Door) -> Box:
 # Rooms
 
 
-def _split(box: Box, style: FloorStyle, rng: Rng) -> list[Room]:
+def split_into_rooms(box: Box, style: FloorStyle, rng: Rng) -> list[Room]:
+    """Return the rooms and pieces of corridor that a part of a floor is cut into."""
     along_x = box.width_m >= box.height_m
     if box.area_m2 > style.corridor_area_m2:
         width_m = float(rng.uniform(*style.corridor_width_m))
         lower, rest = _cut(box, along_x, float(rng.uniform(0.36, 0.58)))
         corridor, upper = _cut(rest, along_x, width_m / (rest.width_m if along_x else rest.height_m))
-        return [Room(CORRIDOR, corridor), *_split(lower, style, rng), *_split(upper, style, rng)]
+        return [Room(CORRIDOR, corridor), *split_into_rooms(lower, style, rng), *split_into_rooms(upper, style, rng)]
     longer_m = max(box.width_m, box.height_m)
     if box.area_m2 <= rng.uniform(*style.room_area_m2) or longer_m < 2.0 * style.narrowest_room_m:
         return [Room(_kind(box, rng), box)]
     edge = style.narrowest_room_m / longer_m
     lower, upper = _cut(box, along_x, float(np.clip(rng.uniform(0.28, 0.72), edge, 1.0 - edge)))
-    return [*_split(lower, style, rng), *_split(upper, style, rng)]
+    return [*split_into_rooms(lower, style, rng), *split_into_rooms(upper, style, rng)]
 
 
 def _cut(box: Box, along_x: bool, share: float) -> tuple[Box, Box]:
@@ -155,7 +158,8 @@ def _without_a_corner(rooms: list[Room], extent: Box, rng: Rng) -> list[Room]:
 # Doors
 
 
-def _choose_doors(rooms: Sequence[Room], style: FloorStyle, rng: Rng) -> list[Door]:
+def choose_doors(rooms: Sequence[Room], style: FloorStyle, rng: Rng) -> list[Door]:
+    """Return doors that make every room reachable, and a few more."""
     shared = [
         wall
         for low in range(len(rooms))
@@ -184,10 +188,10 @@ def _corridors_lacking(wall: Door, rooms: Sequence[Room]) -> int:
 def _shared_wall(low: int, high: int, rooms: Sequence[Room]) -> Door | None:
     """Return the whole wall between two rooms as one opening, if ``high`` is right of or above ``low``."""
     first, second = rooms[low].box, rooms[high].box
-    if abs(first.x1_m - second.x0_m) < _TOUCHING_M:
+    if abs(first.x1_m - second.x0_m) < TOUCHING_M:
         lo_m, hi_m = max(first.y0_m, second.y0_m), min(first.y1_m, second.y1_m)
         vertical, at_m = True, first.x1_m
-    elif abs(first.y1_m - second.y0_m) < _TOUCHING_M:
+    elif abs(first.y1_m - second.y0_m) < TOUCHING_M:
         lo_m, hi_m = max(first.x0_m, second.x0_m), min(first.x1_m, second.x1_m)
         vertical, at_m = False, first.y1_m
     else:
@@ -215,13 +219,14 @@ def _door(wall: Door, style: FloorStyle, rng: Rng, *, spare: bool) -> Door:
         wall,
         lo_m=lo_m,
         hi_m=lo_m + width_m,
-        leaf_deg=None if is_wide else _leaf_deg(rng, spare=spare),
+        leaf_deg=None if is_wide else leaf_deg(rng, spare=spare),
         hinge_low=bool(rng.uniform() < 0.5),
         swings_up=bool(rng.uniform() < 0.5),
     )
 
 
-def _leaf_deg(rng: Rng, *, spare: bool) -> float | None:
+def leaf_deg(rng: Rng, *, spare: bool) -> float | None:
+    """Return how far a random door stands open; ``spare`` ones may be closed."""
     chance = float(rng.uniform())
     if spare and chance < 0.5:
         return 0.0
@@ -230,111 +235,3 @@ def _leaf_deg(rng: Rng, *, spare: bool) -> float | None:
     if chance < 0.85:
         return float(rng.uniform(42.0, 58.0))
     return None
-
-
-def _door_edges(door: Door, wall_m: float) -> Edges:
-    """Return the jambs and the leaf of a door."""
-    half_m = 0.5 * wall_m
-    jambs = np.array([[along, -half_m, along, half_m] for along in (door.lo_m, door.hi_m)])
-    parts = [jambs] if door.leaf_deg is None else [jambs, polygon_edges(_leaf(door, half_m))]
-    edges = np.vstack(parts)
-    across = edges[:, 1::2] + door.at_m
-    columns = (across, edges[:, 0::2]) if door.vertical else (edges[:, 0::2], across)
-    return np.stack([columns[0][:, 0], columns[1][:, 0], columns[0][:, 1], columns[1][:, 1]], axis=1)
-
-
-def _leaf(door: Door, half_wall_m: float) -> Points:
-    """Return the corners of the leaf as (along the wall, across it)."""
-    turn_rad = math.radians(door.leaf_deg or 0.0)
-    width_m = door.hi_m - door.lo_m
-    middle = 0.5 * width_m * np.array([math.cos(turn_rad), math.sin(turn_rad)])
-    corners = rectangle(width_m, 0.045, Sim2(middle[0], middle[1], turn_rad))
-    flip = (1.0 if door.hinge_low else -1.0, 1.0 if door.swings_up else -1.0)
-    hinge = (door.lo_m if door.hinge_low else door.hi_m, flip[1] * (half_wall_m - 0.03))
-    return corners * flip + hinge
-
-
-# Walls
-
-
-def _room_walls(
-    index: int, rooms: Sequence[Room], doors: Sequence[Door], style: FloorStyle, rng: Rng
-) -> tuple[Edges, Edges]:
-    """Return the solid and the glass edges of one room's four walls, as seen from inside."""
-    solid: list[list[float]] = []
-    glass: list[list[float]] = []
-    for vertical in (True, False):
-        for is_high in (False, True):
-            side = _Side(rooms[index].box, vertical, is_high)
-            gaps = [(door.lo_m, door.hi_m) for door in doors if index in door.rooms and side.has(door)]
-            panes = _windows(side, index, rooms, style, rng)
-            inner = side.along(-0.5 * style.wall_m)
-            solid += [side.edge(piece, style.wall_m) for piece in _left_over(inner, [*gaps, *panes])]
-            glass += [side.edge(pane, style.wall_m) for pane in panes]
-    return np.reshape(solid, (-1, 4)), np.reshape(glass, (-1, 4))
-
-
-@dataclass(frozen=True, slots=True)
-class _Side:
-    """One of the four sides of a room."""
-
-    box: Box
-    vertical: bool
-    is_high: bool
-
-    @property
-    def at_m(self) -> float:
-        """Where the wall's centre line is."""
-        if self.vertical:
-            return self.box.x1_m if self.is_high else self.box.x0_m
-        return self.box.y1_m if self.is_high else self.box.y0_m
-
-    def along(self, margin_m: float = 0.0) -> Interval:
-        """Return from where to where the side runs."""
-        box = self.box.grown(margin_m)
-        return (box.y0_m, box.y1_m) if self.vertical else (box.x0_m, box.x1_m)
-
-    def has(self, door: Door) -> bool:
-        """Tell whether a door of this room is in this side."""
-        return door.vertical == self.vertical and abs(door.at_m - self.at_m) < _TOUCHING_M
-
-    def touches(self, other: Box) -> bool:
-        """Tell whether the side lies against another room."""
-        other_m = _Side(other, self.vertical, not self.is_high).at_m
-        return abs(other_m - self.at_m) < _TOUCHING_M
-
-    def edge(self, piece: Interval, wall_m: float) -> list[float]:
-        """Return the inner face of a piece of this side."""
-        face_m = self.at_m + (-0.5 if self.is_high else 0.5) * wall_m
-        lo_m, hi_m = piece
-        return [face_m, lo_m, face_m, hi_m] if self.vertical else [lo_m, face_m, hi_m, face_m]
-
-
-def _left_over(whole: Interval, gaps: Sequence[Interval]) -> list[Interval]:
-    """Return what is left of an interval without the gaps."""
-    pieces: list[Interval] = []
-    start = whole[0]
-    for lo, hi in sorted(gaps):
-        end = min(lo, whole[1])
-        if end > start:
-            pieces.append((start, end))
-        start = max(start, hi)
-    if start < whole[1]:
-        pieces.append((start, whole[1]))
-    return pieces
-
-
-def _windows(side: _Side, index: int, rooms: Sequence[Room], style: FloorStyle, rng: Rng) -> list[Interval]:
-    """Return the panes in a side, in the parts of it that no other room lies against."""
-    whole = side.along(-0.6)
-    neighbours = [room.box for other, room in enumerate(rooms) if other != index and side.touches(room.box)]
-    outside = _left_over(whole, [_Side(box, side.vertical, False).along() for box in neighbours])
-    panes: list[Interval] = []
-    for lo_m, hi_m in outside:
-        at_m = lo_m
-        while at_m + 0.8 < hi_m:
-            length_m = min(float(rng.uniform(0.8, 2.2)), hi_m - at_m)
-            if rng.uniform() < style.window_share:
-                panes.append((at_m, at_m + length_m))
-            at_m += length_m + float(rng.uniform(0.2, 0.9))
-    return panes

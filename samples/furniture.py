@@ -56,8 +56,21 @@ class Lot:
     in_corner: bool = False
 
 
-def furnish(room: Room, keep_clear: Sequence[Box], amount: float, rng: Rng) -> list[Points]:
-    """Return the polygons of the furniture of a room, none of it in ``keep_clear``.
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """A piece where it stands: the middle of its area, and the direction of its own x axis."""
+
+    piece: Piece
+    at: Sim2
+
+    @property
+    def polygons(self) -> list[Points]:
+        """Its polygons on the floor."""
+        return [self.at.apply(polygon) for polygon in self.piece.polygons]
+
+
+def furnish(room: Room, keep_clear: Sequence[Box], amount: float, rng: Rng) -> list[Placed]:
+    """Return the furniture of a room, none of it in ``keep_clear``.
 
     Parameters
     ----------
@@ -73,16 +86,18 @@ def furnish(room: Room, keep_clear: Sequence[Box], amount: float, rng: Rng) -> l
     gap_m = 1.0 if room.kind == "corridor" else 0.4
     size = float(np.clip(room.box.area_m2 / 22.0, 0.5, 2.5))
     taken = list(keep_clear)
-    polygons: list[Points] = []
+    found: list[Placed] = []
     for lot in FURNISHING.get(room.kind, ()):
         count = round(amount * size * rng.integers(lot.least, lot.most + 1))
         for _ in range(count):
-            polygons += _place(lot, room.box, taken, gap_m, rng)
-    return polygons
+            placed = _place(lot, room.box, taken, gap_m, rng)
+            if placed is not None:
+                found.append(placed)
+    return found
 
 
-def _place(lot: Lot, inside: Box, taken: list[Box], gap_m: float, rng: Rng) -> list[Points]:
-    """Return the placed polygons of one piece, and note its area in ``taken``; nothing if there is no room."""
+def _place(lot: Lot, inside: Box, taken: list[Box], gap_m: float, rng: Rng) -> Placed | None:
+    """Return one piece where it stands, and note its area in ``taken``; None if there is no room."""
     piece = lot.make(rng)
     for _ in range(_TRIES):
         at = _pose(lot, piece, inside, rng)
@@ -91,8 +106,8 @@ def _place(lot: Lot, inside: Box, taken: list[Box], gap_m: float, rng: Rng) -> l
         area = Box(x0_m, y0_m, x1_m, y1_m)
         if inside.grown(1e-6).holds(area) and not any(area.overlaps(other) for other in taken):
             taken.append(area.grown(gap_m))
-            return [at.apply(polygon) for polygon in piece.polygons]
-    return []
+            return Placed(piece, at)
+    return None
 
 
 def _pose(lot: Lot, piece: Piece, inside: Box, rng: Rng) -> Sim2:
@@ -229,6 +244,9 @@ _PILLAR = _block((0.35, 0.5), (0.35, 0.5))
 _COLUMN = _round((0.18, 0.3))
 _PLANT = _round((0.14, 0.24))
 _BIN = _round((0.12, 0.17))
+_BED = _block((1.9, 2.1), (0.9, 1.8))
+_RACK = _block((2.5, 6.0), (0.8, 1.1))
+_PALLET = _block((0.8, 1.2), (0.8, 1.2))
 _CORNER_SHAFT = Lot(_SHAFT, 0, 1, in_corner=True)
 
 FURNISHING: Mapping[str, tuple[Lot, ...]] = {
@@ -299,5 +317,29 @@ FURNISHING: Mapping[str, tuple[Lot, ...]] = {
         Lot(_MACHINE, 1, 1),
         Lot(_SHELF, 1, 2),
         Lot(_BIN, 1, 1),
+    ),
+    "bedroom": (
+        Lot(_BED, 1, 1),
+        Lot(_CABINET, 1, 2),
+        Lot(_BIN, 0, 1),
+    ),
+    "living": (
+        Lot(_SOFA, 1, 2),
+        Lot(_table, 1, 1, against_wall=False),
+        Lot(_SHELF, 1, 2),
+        Lot(_round_table, 0, 1, against_wall=False, any_turn=True),
+        Lot(_PLANT, 0, 2),
+    ),
+    "bath": (
+        Lot(_COUNTER, 1, 1),
+        Lot(_BIN, 0, 1),
+    ),
+    "hall": (
+        Lot(_PILLAR, 0, 1, against_wall=False),
+        Lot(_RACK, 0, 2, against_wall=False),
+        Lot(_PALLET, 1, 4, against_wall=False, any_turn=True),
+        Lot(_stack, 0, 2, against_wall=False, any_turn=True),
+        Lot(_MACHINE, 0, 1, against_wall=False, any_turn=True),
+        Lot(_COLUMN, 0, 1, against_wall=False),
     ),
 }

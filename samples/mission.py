@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,33 +13,9 @@ from mapmerge.sim2 import Points, Sim2, wrap_angle
 from samples.drive import Pace
 from samples.lidar import Lidar, beam_ends
 from samples.mapping import Mapper, SensorModel
+from samples.people import Crowd
+from samples.slam import Drift, Warp
 from samples.world import Rng, World
-
-
-@dataclass(frozen=True, slots=True)
-class Drift:
-    """How far a SLAM's pose estimate wanders from the truth; it never wanders off.
-
-    Parameters
-    ----------
-    position_m, yaw_rad
-        Standard deviation.
-    memory_s
-        How long an error lasts.
-    """
-
-    position_m: float = 0.008
-    yaw_rad: float = 0.0015
-    memory_s: float = 12.0
-
-    def errors(self, count: int, period_s: float, rng: Rng) -> Iterator[Sim2]:
-        """Yield the errors of ``count`` poses, as seen from the robot; the first is zero."""
-        keep = math.exp(-period_s / self.memory_s)
-        spread = np.array([self.position_m, self.position_m, self.yaw_rad]) * math.sqrt(1.0 - keep**2)
-        error = np.zeros(3)
-        for _ in range(count):
-            yield Sim2(*error.tolist())
-            error = keep * error + rng.normal(0.0, spread)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,18 +24,22 @@ class Robot:
 
     Parameters
     ----------
-    lidar, pace, model, drift
+    lidar, pace, model, drift, warp
         Its scanner, its speed, its way of mapping, its errors.
     scan_every_m, scan_every_rad
         A scan goes into the map once the robot has moved or turned this far since the last one.
+    people
+        How many walk about around it.
     """
 
     lidar: Lidar = field(default_factory=Lidar)
     pace: Pace = field(default_factory=Pace)
     model: SensorModel = field(default_factory=SensorModel)
     drift: Drift = field(default_factory=Drift)
+    warp: Warp = field(default_factory=Warp)
     scan_every_m: float = 0.3
     scan_every_rad: float = 0.5
+    people: int = 0
 
     def is_due(self, now: Sim2, last: Sim2 | None) -> bool:
         """Tell whether to map a scan at a pose, given the pose of the last one that was."""
@@ -90,12 +70,15 @@ class Run:
         Estimated pose in the map frame at times after the start.
     duration_s
         Time of the last pose.
+    world_from_robot
+        True pose at each of the times of ``poses``.
     """
 
     world_from_map: Sim2
     snapshots: tuple[Snapshot, ...]
     poses: tuple[tuple[float, Sim2], ...]
     duration_s: float
+    world_from_robot: tuple[Sim2, ...]
 
 
 def explore(world: World, world_from_robot: Sequence[Sim2], robot: Robot, maps: int, rng: Rng) -> Run:
@@ -115,30 +98,28 @@ def explore(world: World, world_from_robot: Sequence[Sim2], robot: Robot, maps: 
         Source of chance.
     """
     world_from_map = world_from_robot[0]
+    map_from_start = robot.warp.apply(world_from_map).inverse()
     period_s = robot.pace.period_s
     due = _snapshot_ticks(len(world_from_robot), maps, rng)
     mapper = Mapper(robot.model)
     snapshots: list[Snapshot] = []
     poses: list[tuple[float, Sim2]] = []
     mapped: Sim2 | None = None
+    crowd = Crowd(robot.people, rng)
     errors = robot.drift.errors(len(world_from_robot), period_s, rng)
     for tick, (true_pose, error) in enumerate(zip(world_from_robot, errors, strict=True)):
-        map_from_robot = world_from_map.inverse() @ true_pose @ error
+        map_from_robot = map_from_start @ robot.warp.apply(true_pose) @ error
         poses.append((tick * period_s, map_from_robot))
         if robot.is_due(true_pose, mapped):
             mapped = true_pose
-            ends_m = _seen(robot.lidar, world, true_pose, map_from_robot, rng)
+            ranges_m = crowd.hide(robot.lidar.scan(world, true_pose, rng), robot.lidar, true_pose)
+            back = np.isfinite(ranges_m)
+            ends_m = beam_ends(ranges_m[back], robot.lidar.angles_rad[back], map_from_robot)
             mapper.add((map_from_robot.x_m, map_from_robot.y_m), ends_m)
         if tick in due:
             snapshots.append(Snapshot(tick * period_s, mapper.grid()))
-    return Run(world_from_map, tuple(snapshots), tuple(poses), (len(world_from_robot) - 1) * period_s)
-
-
-def _seen(lidar: Lidar, world: World, world_from_robot: Sim2, map_from_robot: Sim2, rng: Rng) -> Points:
-    """Return where the beams of a scan end, in the frame of the robot's map."""
-    ranges_m = lidar.scan(world, world_from_robot, rng)
-    back = np.isfinite(ranges_m)
-    return beam_ends(ranges_m[back], lidar.angles_rad[back], map_from_robot)
+    duration_s = (len(world_from_robot) - 1) * period_s
+    return Run(world_from_map, tuple(snapshots), tuple(poses), duration_s, tuple(world_from_robot))
 
 
 def _snapshot_ticks(ticks: int, maps: int, rng: Rng) -> set[int]:
