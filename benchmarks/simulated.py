@@ -1,0 +1,116 @@
+"""Part (b): methods on simulated pairs with known truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing import get_context
+from time import perf_counter
+
+import cv2
+
+from benchmarks.cases import Case
+from benchmarks.methods import load_method
+from benchmarks.recipes import raw_image
+from benchmarks.verdicts import Verdict, error_of, tolerance, verdict
+from samples.pairs import Pair
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What one method made of one pair.
+
+    Parameters
+    ----------
+    method, name, kind, related
+        Which.
+    overlap, ambiguous, bend_m, cell_m
+        Of the pair, see `samples.pairs.Pair`; the cell is the coarser map's.
+    verdict, reason
+        What became of it, and what the method says decided.
+    is_right
+        Whether the best placement is within the tolerance, taken or not; None without a placement.
+    error_m, error_deg
+        Of the best placement; None without one, or without a truth.
+    confidence
+        As the method states it for the best placement.
+    seconds, sift_seconds
+        Time of the method, with all it prepares of both maps; of one `SIFT.detectAndCompute` on the larger raw map.
+    """
+
+    method: str
+    name: str
+    kind: str
+    related: str
+    overlap: float
+    ambiguous: bool
+    bend_m: float
+    cell_m: float
+    verdict: Verdict
+    reason: str
+    is_right: bool | None
+    error_m: float | None
+    error_deg: float | None
+    confidence: float | None
+    seconds: float
+    sift_seconds: float
+
+
+def results(cases: Sequence[Case], methods: Sequence[str], processes: int) -> Iterator[Result]:
+    """Yield the results of all methods on all cases, case by case, in order."""
+    if processes == 1:
+        yield from (result for case in cases for result in _of_case((case, methods)))
+        return
+    with get_context("spawn").Pool(processes, _single_threaded) as pool:
+        for found in pool.imap(_of_case, [(case, methods) for case in cases]):
+            yield from found
+
+
+def _single_threaded() -> None:
+    cv2.setNumThreads(1)
+
+
+def _of_case(job: tuple[Case, Iterable[str]]) -> list[Result]:
+    case, methods = job
+    pair = case.made()
+    sift_seconds = sift_time_s(pair)
+    return [judged(pair, name, sift_seconds) for name in methods]
+
+
+def sift_time_s(pair: Pair) -> float:
+    """Return how long SIFT takes for the larger map: the yardstick of all times."""
+    larger = max((pair.target, pair.source), key=lambda grid: grid.cells.size)
+    image = raw_image(larger)
+    begin = perf_counter()
+    cv2.SIFT_create().detectAndCompute(image, None)  # type: ignore[call-overload]
+    return perf_counter() - begin
+
+
+def judged(pair: Pair, method: str, sift_seconds: float) -> Result:
+    """Return what a method makes of a pair."""
+    place = load_method(method)
+    begin = perf_counter()
+    placed = place(pair.target, pair.source)
+    seconds = perf_counter() - begin
+    cell_m = max(pair.target.resolution_m, pair.source.resolution_m)
+    allowed = tolerance(cell_m, pair.bend_m)
+    found = placed.target_from_source
+    error = None if found is None or pair.truth is None else error_of(found, pair.truth, pair.centre_m)
+    return Result(
+        method=method,
+        name=pair.name,
+        kind=pair.kind,
+        related=pair.related,
+        overlap=pair.overlap,
+        ambiguous=pair.ambiguous,
+        bend_m=pair.bend_m,
+        cell_m=cell_m,
+        verdict=verdict(error, allowed, accepted=placed.accepted, belongs=pair.truth is not None),
+        reason=placed.reason,
+        is_right=None if found is None else error is not None and error.within(allowed),
+        error_m=None if error is None else error.distance_m,
+        error_deg=None if error is None else error.angle_deg,
+        confidence=placed.confidence,
+        seconds=seconds,
+        sift_seconds=sift_seconds,
+    )
