@@ -65,7 +65,7 @@ def _matcher(name: str) -> Method:
     def place(target: Grid, source: Grid) -> Placed:
         resolution_m = max(config.search.working_cell_m, target.resolution_m, source.resolution_m)
         prepared = [matcher.prepare(grid, resolution_m, config) for grid in (target, source)]
-        match = matcher.match(*prepared, config)
+        match = matcher.match(prepared[0], prepared[1], config)
         return Placed(match.target_from_source, match.accepted, match.reason.code.value, match.confidence)
 
     return place

@@ -27,12 +27,12 @@ _CELLS = CellConfig()
 
 def orb(target: Grid, source: Grid) -> Placed:
     """Place a map by ORB features."""
-    return _by_features(target, source, cv2.ORB_create(nfeatures=2000), cv2.NORM_HAMMING)
+    return _by_features(target, source, cv2.ORB.create(nfeatures=2000), cv2.NORM_HAMMING)
 
 
 def sift(target: Grid, source: Grid) -> Placed:
     """Place a map by SIFT features."""
-    return _by_features(target, source, cv2.SIFT_create(), cv2.NORM_L2)
+    return _by_features(target, source, cv2.SIFT.create(), cv2.NORM_L2)
 
 
 def raw_image(grid: Grid) -> Image:
@@ -41,7 +41,7 @@ def raw_image(grid: Grid) -> Image:
     return np.where(cells < 0, 128, 255 - cells * 255 // 100).astype(np.uint8)
 
 
-def _by_features(target: Grid, source: Grid, features: Any, norm: int) -> Placed:
+def _by_features(target: Grid, source: Grid, features: cv2.Feature2D, norm: int) -> Placed:
     resolution_m = max(target.resolution_m, source.resolution_m)
     grids = [at_resolution(grid.cropped_to_known(), resolution_m, _CELLS) for grid in (target, source)]
     found = [features.detectAndCompute(raw_image(grid), None) for grid in grids]
@@ -63,7 +63,7 @@ def _by_features(target: Grid, source: Grid, features: Any, norm: int) -> Placed
     return Placed(_between_maps(matrix, grids[0], grids[1]), True, "accepted")
 
 
-def _between_maps(matrix: NDArray[np.float64], target: Grid, source: Grid) -> Sim2:
+def _between_maps(matrix: NDArray[Any], target: Grid, source: Grid) -> Sim2:
     """Return a transform of pixels, whose centres are at whole numbers, as one between map frames."""
     scale, yaw_rad = math.hypot(matrix[0, 0], matrix[1, 0]), math.atan2(matrix[1, 0], matrix[0, 0])
     cell_m, half_m = target.resolution_m, 0.5 * target.resolution_m

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from multiprocessing import get_context
 from time import perf_counter
 
 import cv2
@@ -28,8 +27,9 @@ class Result:
         Of the pair, see `samples.pairs.Pair`; the cell is the coarser map's.
     verdict, reason
         What became of it, and what the method says decided.
-    is_right
-        Whether the best placement is within the tolerance, taken or not; None without a placement.
+    is_there, is_right
+        Whether the best placement, taken or not, is the right place, and whether it is within the tolerance; None
+        without a placement.
     error_m, error_deg
         Of the best placement; None without one, or without a truth.
     confidence
@@ -48,6 +48,7 @@ class Result:
     cell_m: float
     verdict: Verdict
     reason: str
+    is_there: bool | None
     is_right: bool | None
     error_m: float | None
     error_deg: float | None
@@ -56,25 +57,11 @@ class Result:
     sift_seconds: float
 
 
-def results(cases: Sequence[Case], methods: Sequence[str], processes: int) -> Iterator[Result]:
-    """Yield the results of all methods on all cases, case by case, in order."""
-    if processes == 1:
-        yield from (result for case in cases for result in _of_case((case, methods)))
-        return
-    with get_context("spawn").Pool(processes, _single_threaded) as pool:
-        for found in pool.imap(_of_case, [(case, methods) for case in cases]):
-            yield from found
-
-
-def _single_threaded() -> None:
-    cv2.setNumThreads(1)
-
-
-def _of_case(job: tuple[Case, Iterable[str]]) -> list[Result]:
-    case, methods = job
+def results(case: Case, methods: Sequence[str]) -> list[Result]:
+    """Return what each method makes of a case."""
     pair = case.made()
     sift_seconds = sift_time_s(pair)
-    return [judged(pair, name, sift_seconds) for name in methods]
+    return [judged(pair, method, sift_seconds) for method in methods]
 
 
 def sift_time_s(pair: Pair) -> float:
@@ -82,7 +69,7 @@ def sift_time_s(pair: Pair) -> float:
     larger = max((pair.target, pair.source), key=lambda grid: grid.cells.size)
     image = raw_image(larger)
     begin = perf_counter()
-    cv2.SIFT_create().detectAndCompute(image, None)  # type: ignore[call-overload]
+    cv2.SIFT.create().detectAndCompute(image, None)
     return perf_counter() - begin
 
 
@@ -107,6 +94,7 @@ def judged(pair: Pair, method: str, sift_seconds: float) -> Result:
         cell_m=cell_m,
         verdict=verdict(error, allowed, accepted=placed.accepted, belongs=pair.truth is not None),
         reason=placed.reason,
+        is_there=None if found is None else error is not None and not error.is_elsewhere,
         is_right=None if found is None else error is not None and error.within(allowed),
         error_m=None if error is None else error.distance_m,
         error_deg=None if error is None else error.angle_deg,
