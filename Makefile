@@ -25,8 +25,8 @@ format: $(VENV)/.dev ## format the code and fix what can be fixed
 docs: $(VENV)/.dev ## write docs/cli.md anew from --help
 	$(BIN)/python scripts/cli_reference.py
 
-bench: $(VENV)/.dev ## measure placements on real recordings against their truth
-	$(BIN)/python -m benchmarks.real
+bench: $(VENV)/.dev ## measure placements against known truth
+	$(BIN)/python -m benchmarks.truth
 
 picture: $(VENV)/.runtime ## take README's picture anew; needs a graphics card or a software renderer (mesa-vulkan-drivers)
 	mkdir -p out

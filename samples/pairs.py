@@ -189,7 +189,7 @@ def _anywhere(robots: int, rng: Rng) -> list[Strip]:
     """Return strips of any breadth, in any direction."""
     strips: list[Strip] = []
     for _ in range(robots):
-        breadth = float(rng.uniform(0.4, 0.8))
+        breadth = float(rng.uniform(0.15, 0.7))
         lo = float(rng.uniform(0.0, 1.0 - breadth))
         ends = (lo, lo + breadth) if rng.uniform() < 0.5 else (lo + breadth, lo)
         strips.append(Strip(*ends, float(rng.uniform(0.0, math.tau))))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.real import RECORDINGS
+from benchmarks.recordings import RECORDINGS
 from tests.data_paths import shared_data
 from tests.outputs import maps, raw
 from tests.program import Program
