@@ -15,11 +15,7 @@ from samples.mission import known_at
 MIN_OCCUPIED, MAX_FREE = 65, 25
 _TOLERANCE_M = 0.15
 _MOST_POINTS = 2000
-<<<<<<< HEAD
-_ALIKE = 0.9
-=======
 _ALIKE = 0.97
->>>>>>> bench
 _ALIKE_AREA = 0.7
 
 
@@ -91,11 +87,7 @@ def _met(look_at: Look, walls_m: Points, reach_m: float) -> float:
 def explains_as_well(target: Look, source: Look, truth: Sim2, other: Sim2) -> bool:
     """Tell whether another placement explains two maps about as well as the true one.
 
-<<<<<<< HEAD
-    The area that both maps know must be at least 0.7 times as large, and the walls must agree at least 0.9 times as
-=======
     The area that both maps know must be at least 0.7 times as large, and the walls must agree at least 0.97 times as
->>>>>>> bench
     well, in the worse of both directions.
     """
     if shared_m2(target, source, other) < _ALIKE_AREA * shared_m2(target, source, truth):

@@ -63,19 +63,11 @@ def drawn_mess(rng: Rng) -> Mess:
         noise_m=float(rng.uniform(0.0, MOST_NOISE_M)),
         dropout=float(rng.uniform(0.0, 0.04)),
         warp_m=MOST_WARP_M * float(rng.uniform()) ** 2,
-<<<<<<< HEAD
-        drift_m=0.004 + 0.05 * float(rng.uniform()) ** 2,
-        drift_rad=0.001 + 0.007 * float(rng.uniform()) ** 2,
-        memory_s=float(rng.uniform(10.0, 90.0)),
-        people=int(rng.integers(0, 4)),
-        changes=Changes(*rng.uniform(0.0, (0.5, 0.15, 0.6)).tolist()),
-=======
         drift_m=0.003 + 0.03 * float(rng.uniform()) ** 2,
         drift_rad=0.0008 + 0.005 * float(rng.uniform()) ** 2,
         memory_s=float(rng.uniform(10.0, 90.0)),
         people=int(rng.integers(0, 3)),
         changes=Changes(*rng.uniform(0.0, (0.25, 0.05, 0.3)).tolist()),
->>>>>>> bench
         beams=int(rng.choice([360, 360, 720])),
         field_rad=math.radians(float(rng.choice([360.0, 360.0, 270.0, 180.0]))),
         reach_m=float(rng.choice([6.0, 8.0, 12.0, 20.0])),

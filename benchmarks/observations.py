@@ -1,0 +1,169 @@
+"""What the default method sees of pairs with known truth: what its confidence is fitted on, and checked on.
+
+Simulated buildings have seeds below `benchmarks.cases.FIRST_SEED`; every fourth of them is held out. Recorded maps are
+cut, so that they overlap less; those of one building are held out.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.recorded_cuts import cut_pairs, cut_strangers, unrelated
+from mapmerge.config import MergeConfig
+from mapmerge.grid import Grid
+from mapmerge.match import load_matcher
+from mapmerge.match.cues import Cues
+from mapmerge.sim2 import Sim2, wrap_angle
+from samples.kinds import KINDS
+from samples.pairs import Mission, Pair, mission, pairs, strangers
+
+BLOCK = 4
+PAIRS_A_MISSION = 18
+CROSSED_A_BLOCK = 20
+RIGHT_M, RIGHT_RAD = 0.5, math.radians(3.0)
+_LEAST_OVERLAP = 0.08
+_CUTS_A_JOB = 100
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """The best placement of one pair, and whether it is right.
+
+    Parameters
+    ----------
+    name
+        Of the pair.
+    group
+        Kind of simulated building, or "recorded".
+    held_out
+        Whether its building is held out of the fit.
+    related
+        Whether there is a right placement.
+    ambiguous
+        By construction.
+    overlap
+        True share of the smaller map that both know.
+    right
+        Whether the placement is the true one.
+    cues
+        What spoke for and against it.
+    """
+
+    name: str
+    group: str
+    held_out: bool
+    related: bool
+    ambiguous: bool
+    overlap: float
+    right: bool
+    cues: Cues
+
+    @staticmethod
+    def parse(line: str) -> Observation:
+        """Read one line of a file of observations."""
+        values = json.loads(line)
+        return Observation(**{**values, "cues": Cues(**values["cues"])})
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """Some pairs that one process makes and matches."""
+
+    group: str
+    first: int
+
+
+def jobs(missions: int, cuts: int) -> list[Job]:
+    """Return all work: so many missions of each kind of building, and so many cut pairs of recorded maps."""
+    simulated = [Job(kind, first) for first in range(0, missions, BLOCK) for kind in KINDS]
+    return [*simulated, *(Job("recorded", first) for first in range(0, cuts, _CUTS_A_JOB))]
+
+
+def observed(job: Job) -> list[Observation]:
+    """Match the pairs of a job."""
+    made = _recorded(job.first) if job.group == "recorded" else _simulated(job.group, job.first)
+    return [item for pair, held_out in made if (item := _observation(pair, job.group, held_out=held_out))]
+
+
+def collect(work: Sequence[Job], path: Path, processes: int) -> None:
+    """Write the observations of all jobs to a file, one a line."""
+    with ProcessPoolExecutor(processes) as pool, path.open("w", encoding="utf-8") as file:
+        for found in pool.map(observed, work):
+            file.writelines(json.dumps(asdict(item)) + "\n" for item in found)
+            file.flush()
+
+
+def read(path: Path) -> list[Observation]:
+    """Read a file of observations."""
+    return [Observation.parse(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def _simulated(kind: str, first: int) -> Iterator[tuple[Pair, bool]]:
+    rng = np.random.default_rng([first, 77])
+    missions: list[Mission] = []
+    for seed in range(first, first + BLOCK):
+        held_out = seed % BLOCK == BLOCK - 1
+        try:
+            found = mission(kind, seed)
+            related = list(pairs(found, _LEAST_OVERLAP))
+            twins = [strangers(kind, seed, "next floor"), strangers(kind, seed, "next wing")]
+        except ValueError:  # the robots of this seed meet nothing in common
+            continue
+        missions.append(found)
+        chosen = rng.permutation(len(related))[:PAIRS_A_MISSION].tolist()
+        yield from ((related[index], held_out) for index in chosen)
+        yield from ((pair, held_out) for pair in twins)
+    for one, two in _crossed(missions, rng):
+        yield unrelated("crossed", kind, one, two), False
+
+
+def _crossed(missions: Sequence[Mission], rng: np.random.Generator) -> Iterator[tuple[Grid, Grid]]:
+    """Yield maps of two missions, neither of which is held out."""
+    choices = list(
+        combinations([item for item in missions if int(item.name.rpartition("-")[2]) % BLOCK < BLOCK - 1], 2)
+    )
+    for _ in range(CROSSED_A_BLOCK if choices else 0):
+        one, two = choices[int(rng.integers(len(choices)))]
+        robots = (item.robots[int(rng.integers(len(item.robots)))] for item in (one, two))
+        grids = [robot.maps[int(rng.integers(len(robot.maps)))].grid for robot in robots]
+        yield grids[0], grids[1]
+
+
+def _recorded(first: int) -> Iterator[tuple[Pair, bool]]:
+    yield from cut_pairs(first, _CUTS_A_JOB)
+    yield from cut_strangers(first, _CUTS_A_JOB)
+
+
+def _observation(pair: Pair, group: str, *, held_out: bool) -> Observation | None:
+    config = MergeConfig()
+    matcher = load_matcher(config.method)
+    grids = pair.target, pair.source
+    resolution_m = max(config.search.working_cell_m, *(grid.resolution_m for grid in grids))
+    target, source = (matcher.prepare(grid, resolution_m, config) for grid in grids)
+    match = matcher.match(target, source, config)
+    if match.cues is None or match.target_from_source is None:
+        return None
+    right = pair.truth is not None and is_right(match.target_from_source, pair.truth, pair.centre_m)
+    related = pair.truth is not None
+    return Observation(pair.name, group, held_out, related, pair.ambiguous, pair.overlap, right, match.cues)
+
+
+def is_right(found: Sim2, truth: Sim2, at_m: tuple[float, float]) -> bool:
+    """Tell whether a placement is the true one, give or take what a bent map leaves open."""
+    (x_m, y_m), (true_x_m, true_y_m) = found.apply_point(*at_m), truth.apply_point(*at_m)
+    turn_rad = abs(wrap_angle(found.yaw_rad - truth.yaw_rad))
+    return math.hypot(x_m - true_x_m, y_m - true_y_m) <= RIGHT_M and turn_rad <= RIGHT_RAD
+
+
+def groups(found: Iterable[Observation]) -> dict[str, list[Observation]]:
+    """Return the observations by group, in order of its name."""
+    items = list(found)
+    return {name: [item for item in items if item.group == name] for name in sorted({item.group for item in items})}
