@@ -196,7 +196,7 @@ def _classes_of(cells: NDArray[np.int8], config: MergeConfig) -> NDArray[np.uint
     table = np.where(
         value < 0, CELL_UNKNOWN, np.where(value >= config.cells.min_occupied_percent, CELL_OCCUPIED, known)
     )
-    return np.asarray(cv2.LUT(np.ascontiguousarray(cells).view(np.uint8), table.astype(np.uint8)), np.uint8)
+    return table.astype(np.uint8)[np.ascontiguousarray(cells).view(np.uint8)]
 
 
 def _walls(wall_cells_m: Points, spacing_m: float, reach_m: float) -> tuple[Points, NearestWalls]:

@@ -14,7 +14,7 @@ import numpy as np
 from mapmerge.align import poses_of
 from mapmerge.config import VerifyConfig
 from mapmerge.prepare import CELL_FREE, CELL_OCCUPIED, CELL_UNKNOWN, PreparedMap
-from mapmerge.score import agreement, probe
+from mapmerge.score import Agreement, agreement, probe
 from mapmerge.sim2 import Sim2
 
 
@@ -49,16 +49,14 @@ class Scores:
     violated_wall_m: float
 
 
+def rank_score_m(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, config: VerifyConfig) -> float:
+    """Return what placements are ranked by, see `VerifyConfig.violation_weight`, from all points of both maps."""
+    return float(_agreement(target, source, target_from_source).score_m(config)[0])
+
+
 def verify(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, config: VerifyConfig) -> Scores:
     """Return all that is known of a placement between the grid frames."""
-    everything = max(len(target.walls_m), len(source.walls_m), len(source.free_m), 1)
-    found = agreement(
-        target,
-        source,
-        poses_of([target_from_source]),
-        probe(source, everything, everything),
-        probe(target, everything, everything),
-    )
+    found = _agreement(target, source, target_from_source)
     agree, disagree, both = cell_agreement(target, source, target_from_source)
     cell_m2 = (source.resolution_m * target_from_source.scale) ** 2
     smaller_m2 = min(target.grid.known_area_m2, source.grid.known_area_m2 * target_from_source.scale**2)
@@ -72,6 +70,12 @@ def verify(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, c
         matched_wall_m=float(ahead.matched_m[0] + back.matched_m[0]) / 2,
         violated_wall_m=float(ahead.violated_m[0] + back.violated_m[0]) / 2,
     )
+
+
+def _agreement(target: PreparedMap, source: PreparedMap, target_from_source: Sim2) -> Agreement:
+    most = max(len(target.walls_m), len(source.walls_m), len(source.free_m), 1)
+    pose = poses_of([target_from_source])
+    return agreement(target, source, pose, probe(source, most, most), probe(target, most, most))
 
 
 def cell_agreement(target: PreparedMap, source: PreparedMap, target_from_source: Sim2) -> tuple[int, int, int]:
