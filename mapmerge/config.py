@@ -116,9 +116,9 @@ class SearchConfig(_Settings):
     sweep_free_weights: tuple[float, ...] = (1.0,)
     sweep_shifts: int = 4
     scale_step: float = 1.05
-    clear_agreement: float = 0.85
+    clear_agreement: float = 0.9
     clear_wall_m: float = 10.0
-    clear_likeness: float = 0.6
+    clear_likeness: float = 0.5
     working_cell_m: float = 0.05
 
 

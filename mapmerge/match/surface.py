@@ -27,7 +27,9 @@ class CorrelationSurface:
         The rotation, and the scale.
     values
         Shape (rows, columns): score in metres of wall; a row or column is one step of the shift in y or x. Shifts are
-        cyclic: those of the later half are negative.
+        cyclic: the last ones are negative.
+    negative
+        How many of the last rows, and columns, are of negative shifts.
     origin_m
         The shift of the first value.
     step_m
@@ -36,26 +38,26 @@ class CorrelationSurface:
 
     turn: Sim2
     values: Surface
+    negative: int
     origin_m: tuple[float, float]
     step_m: float
 
     def shift_m(self, rows: Indices, cols: Indices) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the shifts in x and y of some values."""
         height, width = self.values.shape
-        x = np.where(cols < (width + 1) // 2, cols, cols - width) * self.step_m
-        y = np.where(rows < (height + 1) // 2, rows, rows - height) * self.step_m
+        x = np.where(cols < width - self.negative, cols, cols - width) * self.step_m
+        y = np.where(rows < height - self.negative, rows, rows - height) * self.step_m
         return x + self.origin_m[0], y + self.origin_m[1]
 
     def centred(self) -> Surface:
         """Return the values with the most negative shifts first."""
-        return np.fft.fftshift(self.values)
+        return np.roll(self.values, (self.negative, self.negative), axis=(0, 1))
 
     def centred_index(self, target_from_source: Sim2) -> tuple[int, int]:
         """Return row and column in `centred` of the shift that is nearest to that of a placement."""
-        height, width = self.values.shape
         row = round((target_from_source.y_m - self.origin_m[1]) / self.step_m)
         col = round((target_from_source.x_m - self.origin_m[0]) / self.step_m)
-        return row + height // 2, col + width // 2
+        return row + self.negative, col + self.negative
 
 
 class TranslationSearch:
@@ -113,14 +115,15 @@ class TranslationSearch:
         walls, free = (np.asarray(cv2.dft(raster * length_m), np.float32) for raster in rasters)
         low_x_m, low_y_m = low.tolist()
         half = Sim2(0.0, 0.0, turn.yaw_rad + math.pi, turn.scale)
+        reach = min(min(self._shape) - 1, math.ceil(self._reach_m / self._cell_m) + 2)
         ahead = [
-            CorrelationSurface(turn, _correlated(spectra, (walls, free), True), (-low_x_m, -low_y_m), self._cell_m)
+            CorrelationSurface(turn, _correlated(spectra, walls, free, True), reach, (-low_x_m, -low_y_m), self._cell_m)
             for spectra in self._spectra
         ]
-        # turned by 180°, cell k becomes cell −k, whose far corner is the near one of before
+        # turned by 180°, cell k becomes cell −k, whose far corner is the near one of before: no shift is negative
         corner = (low_x_m + self._cell_m, low_y_m + self._cell_m)
         back = [
-            CorrelationSurface(half, _correlated(spectra, (walls, free), False), corner, self._cell_m)
+            CorrelationSurface(half, _correlated(spectra, walls, free, False), 0, corner, self._cell_m)
             for spectra in self._spectra
         ]
         return (*ahead, *back)
@@ -160,6 +163,7 @@ def surface_peaks(surface: CorrelationSurface, peak_distance_m: float) -> tuple[
     return poses, surface.values[rows, cols]
 
 
-def _correlated(target: tuple[Surface, Surface], source: tuple[Surface, Surface], conjugate: bool) -> Surface:
-    walls, free = (cv2.mulSpectrums(one, other, 0, conjB=conjugate) for one, other in zip(target, source, strict=True))
-    return np.asarray(cv2.idft(walls + free, flags=cv2.DFT_REAL_OUTPUT | cv2.DFT_SCALE), np.float32)
+def _correlated(target: tuple[Surface, Surface], walls: Surface, free: Surface, conjugate: bool) -> Surface:
+    product = cv2.mulSpectrums(target[0], walls, 0, conjB=conjugate)
+    product = product + cv2.mulSpectrums(target[1], free, 0, conjB=conjugate)
+    return np.asarray(cv2.idft(product, flags=cv2.DFT_REAL_OUTPUT | cv2.DFT_SCALE), np.float32)
