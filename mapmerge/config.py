@@ -182,6 +182,9 @@ class VerifyConfig(_Settings):
         of them agrees; else ambiguity, if a rival is more than so many times as good.
     min_confidence
         Least calibrated probability that the placement is right, where the method states one.
+    hopeful_confidence
+        Merged maps of several robots are matched with another robot's if the confidence of any pair of them, which is
+        too low by itself, is at least this.
     distinct_m, distinct_rad
         Placements that differ by more than one of these are rivals, not the same.
     """
@@ -196,6 +199,7 @@ class VerifyConfig(_Settings):
     poor_agreement: float = 0.8
     rival_likeness: float = 0.5
     min_confidence: float = 0.999
+    hopeful_confidence: float = 0.05
     distinct_m: float = 0.75
     distinct_rad: float = math.radians(5.0)
 
