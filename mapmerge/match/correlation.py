@@ -124,6 +124,7 @@ def _ranked(pair: PairOfMaps, seen: Look, scales: tuple[float, float], config: M
     """Return the best placement, finely aligned, and its rivals; None if there is no placement at all."""
     if len(seen.poses) == 0:
         return None
+    seen = seen.substantial_first(config.verify.min_matched_wall_m)
     target, source = pair.target.map, pair.source.map
     best = polish(target, source.wall_cells_m, placement_of(seen.poses[0]), config.refine)
     if not pair.allowed(poses_of([best])).all():

@@ -46,6 +46,17 @@ class Look:
         """Return some of the placements."""
         return Look(self.poses[chosen], self.scores_m[chosen], self.matched_m[chosen], self.shares[chosen])
 
+    def substantial_first(self, least_m: float) -> Look:
+        """Return the placements with the best of those first that match at least so much wall, if there are any.
+
+        A placement with hardly any overlap has hardly anything against it; it says nothing of why maps do not fit.
+        """
+        found = np.flatnonzero(self.matched_m >= least_m)
+        if len(found) == 0:
+            return self
+        order = [int(found[0]), *(row for row in range(len(self.poses)) if row != found[0])]
+        return self.rows(order)
+
     def joined(self, other: Look) -> Look:
         """Return the placements of both, best first."""
         both = Look(
