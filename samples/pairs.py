@@ -1,9 +1,10 @@
 """Random pairs of maps with known truth, one by one or in bulk; the same kind and seed give the same pairs.
 
 A pair is *ambiguous by construction* if a symmetry of its site's plan (the next bay of a corridor, a turn by 180°)
-explains the two maps about as well as the truth does, see `samples.likeness.explains_as_well`; two maps of near-twins
-(the next floor, the next wing) if they agree as well as maps of one place have to. This looks at the simulated maps and
-the plan alone, never at what a matcher says.
+explains the two maps about as well as the truth does, see `samples.likeness.explains_as_well`, or if any placement
+explains them in every respect as well, as of a plain room turned round, see `samples.rivals.has_rival`; two maps of
+near-twins (the next floor, the next wing) if they agree as well as maps of one place have to. This looks at the
+simulated maps, the truth and the plan alone, never at what a matcher says.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from samples.explorers import Explored, MapOf, Strip, explored
 from samples.kinds import KINDS, altered
 from samples.likeness import agreement, explains_as_well, look, shared_m2
 from samples.mess import drawn_mess, drawn_resolutions
+from samples.rivals import has_rival
 from samples.shared import Shared, shared, target_from_source
 from samples.sites import Site, reflected
 from samples.world import Rng
@@ -31,8 +33,8 @@ STRANGERS: tuple[Related, ...] = ("other building", "next floor", "next wing")
 
 LEAST_OVERLAP, MOST_OVERLAP = 0.1, 0.9
 _SNAPSHOTS = 6
-_LEAST_AREA_M2 = 18.0
-_LEAST_SHARED_M2 = 4.0
+_LEAST_AREA_M2 = 20.0
+_LEAST_SHARED_M2 = 8.0
 _TWINS_ALIKE = 0.85
 _TRIES = 8
 _NEXT_SITE = 50_000_000
@@ -181,7 +183,7 @@ def _explored(kind: str, seed: int, site: Site, strips: Sequence[Strip], maps: i
 
 def _opposite(overlap: float, direction_rad: float) -> list[Strip]:
     """Return strips from opposite sides: robots see beyond their strips, so that these need not overlap as much."""
-    reach = min(1.0, 0.5 + 0.5 * max(0.0, overlap - 0.15))
+    reach = min(1.0, 0.5 + 0.65 * max(0.0, overlap - 0.15))
     return [Strip(0.0, reach, direction_rad), Strip(1.0, 1.0 - reach, direction_rad)]
 
 
@@ -204,7 +206,7 @@ def _large_enough(robot: Explored) -> list[MapOf]:
 def _pair(name: str, found: Mission, robots: tuple[int, int], maps: tuple[MapOf, MapOf], truth: Shared) -> Pair:
     target, source = (found.robots[index] for index in robots)
     grids = maps[0].grid, maps[1].grid
-    ambiguous = found.site.symmetries and _is_ambiguous(found.site, target, source, grids, truth)
+    ambiguous = _is_ambiguous(found.site, target, source, grids, truth)
     return Pair(
         name,
         found.kind,
@@ -213,17 +215,17 @@ def _pair(name: str, found: Mission, robots: tuple[int, int], maps: tuple[MapOf,
         truth.centre_m,
         truth.overlap,
         truth.bend_m,
-        bool(ambiguous),
+        ambiguous,
         "same place",
     )
 
 
 def _is_ambiguous(site: Site, target: Explored, source: Explored, grids: tuple[Grid, Grid], truth: Shared) -> bool:
     looks = look(grids[0]), look(grids[1])
-    return any(
-        explains_as_well(*looks, truth.target_from_source, target_from_source(target, source, symmetry))
-        for symmetry in site.symmetries
-    )
+    moved = (target_from_source(target, source, symmetry) for symmetry in site.symmetries)
+    if any(explains_as_well(*looks, truth.target_from_source, placement) for placement in moved):
+        return True
+    return has_rival(*looks, truth.target_from_source)
 
 
 def _are_twins(grids: tuple[Grid, Grid], placement: Sim2) -> bool:
