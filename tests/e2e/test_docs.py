@@ -68,7 +68,9 @@ def test_command_line_reference() -> None:
     assert cli_reference.DOCS.read_text(encoding="utf-8") == cli_reference.reference()
 
 
-@pytest.mark.parametrize("name", ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "docs/output-formats.md", "docs/benchmarks.md"])
+@pytest.mark.parametrize(
+    "name", ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "docs/output-formats.md", "docs/benchmarks.md"]
+)
 def test_links_lead_somewhere(name: str) -> None:
     document = ROOT / name
     for target in re.findall(r"\]\(([^)#:]+)\)", document.read_text(encoding="utf-8")):
