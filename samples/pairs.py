@@ -154,16 +154,17 @@ def strangers(kind: str, seed: int, related: Related) -> Pair:
     kind, seed
         As of `pair`.
     related
-        What the second site is to the first: another of the same kind; the next floor, whose outline and corridors are
-        the same, and half of whose rooms are not; the next wing, which is such a floor and, as often as not, mirrored.
+        What the second site is to the first: another of the same kind; the next floor, whose outline, corridors and
+        doors are the same, but whose furniture and many of whose rooms are not; the next wing, which is such a floor
+        and, as often as not, mirrored. The robots go to the same part of both.
     """
     rng = np.random.default_rng([seed, 32, list(KINDS).index(kind)])
     first = KINDS[kind](seed)
     other = _related(kind, first, seed, related, rng)
-    strip = _anywhere(2, rng)
+    strips = _same_part(rng)
     resolutions_m = drawn_resolutions(2, rng)
     target, source = (
-        explored(site, number, strip[number], drawn_mess(rng), resolutions_m[number], 1, rng)
+        explored(site, number, strips[number], drawn_mess(rng), resolutions_m[number], 1, rng)
         for number, site in enumerate((first, other))
     )
     grids = target.maps[-1].grid, source.maps[-1].grid
@@ -185,6 +186,13 @@ def _opposite(overlap: float, direction_rad: float) -> list[Strip]:
     """Return strips from opposite sides: robots see beyond their strips, so that these need not overlap as much."""
     reach = min(1.0, 0.5 + 0.65 * max(0.0, overlap - 0.15))
     return [Strip(0.0, reach, direction_rad), Strip(1.0, 1.0 - reach, direction_rad)]
+
+
+def _same_part(rng: Rng) -> list[Strip]:
+    """Return strips of two robots that go to about the same part of a site, from opposite sides."""
+    breadth, direction_rad = float(rng.uniform(0.5, 1.0)), float(rng.uniform(0.0, math.tau))
+    lo = float(rng.uniform(0.0, 1.0 - breadth))
+    return [Strip(lo, lo + breadth, direction_rad), Strip(lo + breadth, lo, direction_rad)]
 
 
 def _anywhere(robots: int, rng: Rng) -> list[Strip]:
