@@ -93,8 +93,8 @@ def test_strangers_have_no_truth(related):
 
 
 def test_one_mission_yields_many_pairs():
-    found = list(pairs(mission("symmetric", 2, robots=3, maps=3)))
-    assert len(found) > 5
+    found = list(pairs(mission("symmetric", 2, robots=3, maps=2)))
+    assert len(found) > 3
     assert len({item.name for item in found}) == len(found)
     for item in found:
         assert 0.05 <= item.overlap <= 1.0
