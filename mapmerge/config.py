@@ -158,6 +158,31 @@ class RefineConfig(_Settings):
 
 
 @dataclass(frozen=True, slots=True)
+class SlackConfig(_Settings):
+    """How far maps may be bent, as by a SLAM's drift.
+
+    Parameters
+    ----------
+    cell_m
+        Side of the squares of the field of shifts.
+    length_m
+        Shifts are alike over about this distance.
+    most_m
+        Largest shift.
+    reject_m
+        One step for each of these, beyond which walls are not drawn to each other.
+    stiffness
+        How much wall, in points, it takes to shift its surroundings by half of what it asks for.
+    """
+
+    cell_m: float = 0.5
+    length_m: float = 1.5
+    most_m: float = 0.9
+    reject_m: tuple[float, ...] = (0.9, 0.9, 0.7, 0.5, 0.4, 0.3)
+    stiffness: float = 30.0
+
+
+@dataclass(frozen=True, slots=True)
 class VerifyConfig(_Settings):
     """What a placement must pass to be accepted.
 
@@ -232,6 +257,7 @@ class MergeConfig(_Settings):
     cells: CellConfig = field(default_factory=CellConfig)
     search: SearchConfig = field(default_factory=SearchConfig)
     refine: RefineConfig = field(default_factory=RefineConfig)
+    slack: SlackConfig = field(default_factory=SlackConfig)
     verify: VerifyConfig = field(default_factory=VerifyConfig)
     moved_m: float = 0.10
     moved_rad: float = math.radians(0.5)
