@@ -48,6 +48,9 @@ class Match:
         What decided.
     confidence
         Calibrated probability that the placement is right; None where the method states none.
+    weight
+        How far the match is trusted against those of other pairs, where the method has a measure of its own; None:
+        by its score.
     rivals
         Distinct placements of the same pair, best first.
     evidence
@@ -59,8 +62,16 @@ class Match:
     accepted: bool
     reason: Reason
     confidence: float | None = None
+    weight: float | None = None
     rivals: tuple[Rival, ...] = ()
     evidence: tuple[Evidence, ...] = ()
+
+    @property
+    def trust(self) -> float:
+        """What the placement of all robots weighs this match by."""
+        if self.weight is not None:
+            return self.weight
+        return self.scores.score_m if self.scores is not None else 0.0
 
 
 class Matcher(Protocol[PreparedT]):
