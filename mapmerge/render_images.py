@@ -14,6 +14,7 @@ from mapmerge.sim2 import Points
 _GAP_PX = 8
 _LABEL_PX = 22
 _MAX_ZOOM = 8.0
+_MANY_MARKS = 150
 _BEHIND: Colour = (232, 232, 232)
 
 
@@ -37,7 +38,7 @@ class _Panel:
 def side_by_side(evidence: ImagesEvidence) -> Rgb:
     """Return both images, seen with y upwards, beside or above each other, whichever shows them larger."""
     images = evidence.target, evidence.source
-    panels = max((_laid_out(images, beside=True), _laid_out(images, beside=False)), key=lambda each: each[0].zoom)
+    panels = max((_laid_out(images, beside=True), _laid_out(images, beside=False)), key=_smaller_zoom)
     width = max(panel.left + panel.width for panel in panels)
     height = max(panel.top + panel.height for panel in panels)
     picture = np.full((height, width, 3), _BEHIND, np.uint8)
@@ -48,13 +49,18 @@ def side_by_side(evidence: ImagesEvidence) -> Rgb:
     )
     for one, other in evidence.pairs:
         cv2.line(picture, _whole(ones[one]), _whole(others[other]), AGREE, 1, cv2.LINE_AA)
-    for place in (*ones, *others):
-        cv2.circle(picture, _whole(place), 3, MARK, 1, cv2.LINE_AA)
+    for places in (ones, others):
+        for place in places:
+            _mark(picture, _whole(place), len(places))
     return titled(picture, evidence.title)
 
 
+def _smaller_zoom(panels: tuple[_Panel, _Panel]) -> float:
+    return min(panel.zoom for panel in panels)
+
+
 def _laid_out(images: tuple[MarkedImage, MarkedImage], *, beside: bool) -> tuple[_Panel, _Panel]:
-    """Return where the images go: at one zoom, where their pixels are of one size, each as large as its half."""
+    """Return where the images go, each as large as its half of the picture allows."""
     across, down = (2, 1) if beside else (1, 2)
     box = (
         (MAX_SIDE_PX - _GAP_PX * (across - 1)) // across,
@@ -80,6 +86,14 @@ def _paste(picture: Rgb, image: MarkedImage, panel: _Panel) -> None:
     grey = cv2.resize(image.pixels[::-1], (panel.width, panel.height), interpolation=interpolation)
     area = picture[panel.top : panel.top + panel.height, panel.left : panel.left + panel.width]
     area[:] = np.asarray(grey, np.uint8)[:, :, None]
+
+
+def _mark(picture: Rgb, at: tuple[int, int], marks: int) -> None:
+    """Mark a place: the fewer marks there are, the larger each is."""
+    if marks > _MANY_MARKS:
+        cv2.circle(picture, at, 1, MARK, -1)
+    else:
+        cv2.circle(picture, at, 3 if marks > 1 else 8, MARK, 1 if marks > 1 else 2, cv2.LINE_AA)
 
 
 def _whole(place: Points) -> tuple[int, int]:

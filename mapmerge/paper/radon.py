@@ -42,7 +42,7 @@ class Radon:
     @property
     def turn_rad(self) -> float:
         """The smallest turn, in [−π/4, π/4], that makes the longest wall parallel to an axis."""
-        return -math.remainder(self.wall_normal_rad, math.pi / 2)
+        return 0.0 - math.remainder(self.wall_normal_rad, math.pi / 2)
 
 
 def radon(occupied_m: Points, angle_step_rad: float, bin_m: float) -> Radon:
