@@ -258,7 +258,7 @@ class ExistingConfig(_Settings):
 
     max_features: int = 1000
     max_side_cells: int = 1500
-    ransac: RansacConfig = field(default_factory=RansacConfig)
+    ransac: RansacConfig = RansacConfig(inlier_m=0.1)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from mapmerge.grid import Grid
 from mapmerge.match.base import Match
 from mapmerge.paper.consensus import best_models, conforming_features, conforming_pairs
 from mapmerge.paper.correction import Correction, correct, picture_grid
-from mapmerge.paper.features import Features, sift
+from mapmerge.paper.features import Features, one_a_place, sift
 from mapmerge.paper.icp import icp
 from mapmerge.paper.ransac import models_of_all_pairs
 from mapmerge.paper.show import correction_evidence, pairs_evidence
@@ -56,7 +56,7 @@ class PaperMatcher:
         paper = config.paper
         picture = picture_grid(grid, config.search.working_cell_m, paper.max_side_cells, config.cells)
         correction = correct(picture, config.cells, paper)
-        features = sift(correction.thickened, 0, paper.max_features)
+        features = one_a_place(sift(correction.thickened, 0, paper.max_features))
         return _Prepared(
             prepare(grid, resolution_m, config), correction, features, correction.in_grid_m(features.pixels)
         )

@@ -32,10 +32,10 @@ class Features:
 
 
 def sift(picture: Image, background: int, most: int) -> Features:
-    """Return the strongest SIFT features of a picture, at most one at a place.
+    """Return the strongest SIFT features of a picture; at one place there may be several, of different orientations.
 
     SIFT leaves out what is near a picture's border and mirrors what lies beyond it; so the picture is framed by its
-    background. Several orientations at one place are one feature: only places are matched.
+    background.
     """
     if picture.size == 0:
         return Features(np.empty((0, 2)), np.empty((0, 128), np.float32))
@@ -45,11 +45,17 @@ def sift(picture: Image, background: int, most: int) -> Features:
         return Features(np.empty((0, 2)), np.empty((0, 128), np.float32))
     places = np.array([point.pt for point in keypoints], np.float64) - _MARGIN_PX
     response = np.array([point.response for point in keypoints])
-    # by strength, ties by place: the order must not depend on how OpenCV found them
-    order = np.lexsort((places[:, 0], places[:, 1], -response))
-    _, first = np.unique(np.rint(places[order]), axis=0, return_index=True)
-    kept = order[np.sort(first)][:most]
+    # by strength, ties by place and direction: the order must not depend on how OpenCV found them
+    direction = np.array([point.angle for point in keypoints])
+    kept = np.lexsort((direction, places[:, 0], places[:, 1], -response))[:most]
     return Features(places[kept], np.asarray(descriptors, np.float32)[kept])
+
+
+def one_a_place(features: Features) -> Features:
+    """Return one feature of each pixel, the first: where only places are matched, several would be counted twice."""
+    _, first = np.unique(np.rint(features.pixels), axis=0, return_index=True)
+    kept = np.sort(first)
+    return Features(features.pixels[kept], features.descriptors[kept])
 
 
 def nearest_pairs(ones: Features, others: Features) -> Cells:

@@ -15,7 +15,7 @@ from mapmerge.paper.consensus import (
     conforming_pairs,
     conforming_to,
 )
-from mapmerge.paper.features import all_pairs, nearest_pairs, sift
+from mapmerge.paper.features import all_pairs, nearest_pairs, one_a_place, sift
 from mapmerge.paper.icp import icp, least_squares
 from mapmerge.paper.ransac import Bounds, drawn_models, models_of_all_pairs, two_pair_models
 from mapmerge.sim2 import Sim2
@@ -122,7 +122,8 @@ class TestFeatures:
         found = sift(picture, 0, 50)
         assert found.pixels.shape == (50, 2)
         assert found.descriptors.shape == (50, 128)
-        assert len(np.unique(np.rint(found.pixels), axis=0)) == 50
+        places = np.rint(one_a_place(found).pixels)
+        assert len(np.unique(places, axis=0)) == len(places) == len(np.unique(np.rint(found.pixels), axis=0))
 
     @pytest.mark.parametrize("shape", [(0, 0), (1, 1), (40, 40)])
     def test_a_picture_of_nothing_has_none(self, shape):
