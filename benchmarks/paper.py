@@ -30,11 +30,11 @@ from benchmarks.paper_cases import (
 )
 from benchmarks.paper_noise import sweep
 from benchmarks.paper_pictures import write_global_map, write_pictures
-from mapmerge.config import MergeConfig, PaperConfig
+from mapmerge.config import MergeConfig, PaperConfig, RansacConfig
 from mapmerge.merger import MergeResult, MergeState, step
 
 METHODS = ("existing", "paper", "correlation")
-_LITERAL = PaperConfig(turn_tolerance_rad=0.0, max_models=1)
+_LITERAL = PaperConfig(turn_tolerance_rad=0.0, max_models=1, ransac=RansacConfig(in_both=False))
 LITERAL: tuple[tuple[str, MergeConfig], ...] = (
     ("scale unbounded", MergeConfig(method="paper", scale="free", scale_range=(0.01, 100.0), paper=_LITERAL)),
     ("turn unbounded", MergeConfig(method="paper", paper=_LITERAL)),

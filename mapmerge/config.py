@@ -178,6 +178,8 @@ class RansacConfig(_Settings):
     ----------
     inlier_m
         The distance ε below which a pair conforms to a model.
+    in_both
+        Whether ε holds in both maps' metres, which matters where scale is free; the paper has it in the target's.
     draws
         Most models that are looked at.
     seed
@@ -190,6 +192,7 @@ class RansacConfig(_Settings):
     """
 
     inlier_m: float = 0.2
+    in_both: bool = True
     draws: int = 60_000
     seed: int = 0
     min_arm_m: float = 1.5

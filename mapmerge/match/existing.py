@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.match.base import Match
-from mapmerge.paper.consensus import best_models, conforming, conforming_to
+from mapmerge.paper.consensus import best_models, conforming, conforming_to, limits_m, refitted
 from mapmerge.paper.correction import picture_grid
 from mapmerge.paper.features import Features, nearest_pairs, sift
 from mapmerge.paper.pixels import PIXEL_UNKNOWN, Image, class_pixels
@@ -60,15 +60,16 @@ class ExistingMatcher:
                 return refused(ReasonCode.PRIOR_CONTRADICTED, message, shown)
             message = "no two pairs of features fit each other at the maps' scale"
             return refused(ReasonCode.NO_CANDIDATE, message, shown)
-        counts = conforming(models, p_m, q_m, pairs, ransac.inlier_m)
+        limit_m = limits_m(models, ransac.inlier_m, in_both=ransac.in_both)
+        counts = conforming(models, p_m, q_m, pairs, limit_m)
         best = best_models(models, counts, p_m, 1, config.verify.distinct_m)
 
         def align(model: Sim2) -> Sim2:
-            return with_known_scale(
-                model, config, p_m[pairs[conforming_to(model, p_m, q_m, pairs, ransac.inlier_m), 0]]
-            )
+            inliers = pairs[conforming_to(model, p_m, q_m, pairs, ransac.inlier_m)]
+            fitted = refitted(model, p_m[inliers[:, 0]], q_m[inliers[:, 1]])
+            return with_known_scale(fitted, config, p_m[inliers[:, 0]])
 
         found = candidates(target.map, source.map, best, align, config.verify)
-        inliers = pairs[conforming_to(best[0], p_m, q_m, pairs, ransac.inlier_m)]
+        inliers = pairs[conforming_to(found[0].target_from_source, p_m, q_m, pairs, ransac.inlier_m)]
         evidence = pairs_evidence((target.pixels, target.features), (source.pixels, source.features), inliers)
         return outcome(target.map, source.map, found, prior, config.verify, (*shown, evidence))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.match.base import Match
-from mapmerge.paper.consensus import best_models, conforming_features, conforming_pairs
+from mapmerge.paper.consensus import best_models, conforming_features, conforming_pairs, limits_m, refitted
 from mapmerge.paper.correction import Correction, correct, picture_grid
 from mapmerge.paper.features import Features, one_a_place, sift
 from mapmerge.paper.icp import icp
@@ -80,13 +80,22 @@ class PaperMatcher:
                 return refused(ReasonCode.PRIOR_CONTRADICTED, message, shown)
             message = "no two corners of one map lie to each other as two of the other do"
             return refused(ReasonCode.NO_CANDIDATE, message, shown)
-        counts = conforming_features(models, p_m, q_m, ransac.inlier_m)
+        limit_m = limits_m(models, ransac.inlier_m, in_both=ransac.in_both)
+        counts = conforming_features(models, p_m, q_m, limit_m)
         best = best_models(models, counts, p_m, paper.max_models, config.verify.distinct_m)
 
         def align(model: Sim2) -> Sim2:
             inliers = conforming_pairs(model, p_m, q_m, ransac.inlier_m)
-            start = with_known_scale(model, config, p_m[inliers[:, 0]])
-            return icp(target.map, source.map.wall_cells_m, start, paper.icp_reject_m, paper.icp_iterations)
+            fitted = refitted(model, p_m[inliers[:, 0]], q_m[inliers[:, 1]])
+            start = with_known_scale(fitted, config, p_m[inliers[:, 0]])
+            return icp(
+                target.map,
+                source.map.wall_cells_m,
+                start,
+                paper.icp_reject_m,
+                paper.icp_iterations,
+                scale_range=config.scale_range if config.scale == "free" else None,
+            )
 
         found = candidates(target.map, source.map, best, align, config.verify)
         inliers = conforming_pairs(found[0].target_from_source, p_m, q_m, ransac.inlier_m)

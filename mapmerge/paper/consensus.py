@@ -6,23 +6,37 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mapmerge.paper.icp import least_squares
 from mapmerge.paper.interest import Cells
-from mapmerge.paper.ransac import Models
+from mapmerge.paper.ransac import Models, Numbers
 from mapmerge.sim2 import Points, Sim2
 
 Counts = NDArray[np.intp]
 
 _CHUNK = 2_000_000
-_CELLS_IN_LIMIT = 4
+_MIN_PAIRS = 3
+_CELLS_IN_LIMIT = 8
 _MAX_SIDE_CELLS = 4000
 
 
-def conforming(models: Models, p_m: Points, q_m: Points, pairs: Cells, limit_m: float) -> Counts:
+def limits_m(models: Models, inlier_m: float, *, in_both: bool) -> Numbers:
+    """Return the limit ε of each model.
+
+    Parameters
+    ----------
+    in_both
+        Whether a pair must conform in both maps' metres; else in the target's, as printed, where any pair conforms to
+        a model that shrinks the source to a point.
+    """
+    return inlier_m * (np.minimum(models.scale, 1.0) if in_both else np.ones(len(models)))
+
+
+def conforming(models: Models, p_m: Points, q_m: Points, pairs: Cells, limit_m: Numbers) -> Counts:
     """Return for each model the number of pairs that conform to it, ‖v_q − v_p‖ < ε (equation 11)."""
     p, q = p_m[pairs[:, 0]], q_m[pairs[:, 1]]
     counts = [
-        np.count_nonzero(np.square(part.apply(p) - q).sum(axis=-1) < limit_m**2, axis=1)
-        for part in _parts(models, len(p))
+        np.count_nonzero(np.square(models[part].apply(p) - q).sum(axis=-1) < limit_m[part, None] ** 2, axis=1)
+        for part in _parts(len(models), len(p))
     ]
     return np.concatenate(counts) if counts else np.empty(0, np.intp)
 
@@ -33,16 +47,19 @@ def conforming_to(model: Sim2, p_m: Points, q_m: Points, pairs: Cells, limit_m: 
     return np.asarray(np.square(error).sum(axis=1) < limit_m**2, np.bool_)
 
 
-def conforming_features(models: Models, p_m: Points, q_m: Points, limit_m: float) -> Counts:
+def conforming_features(models: Models, p_m: Points, q_m: Points, limit_m: Numbers) -> Counts:
     """Return for each model the number of p that conform with some q, of all pairs (equations 11 and 22).
 
     A feature counts once however many others are near: else a crowd of features would count by its square.
     """
-    if len(q_m) == 0:
+    if len(q_m) == 0 or len(models) == 0:
         return np.zeros(len(models), np.intp)
-    near = _Near(q_m, limit_m)
-    counts = [np.count_nonzero(near.at(part.apply(p_m)), axis=1) for part in _parts(models, len(p_m))]
-    return np.concatenate(counts) if counts else np.empty(0, np.intp)
+    nearest = _Distance(q_m, float(limit_m.max()))
+    counts = [
+        np.count_nonzero(nearest.at(models[part].apply(p_m)) < limit_m[part, None], axis=1)
+        for part in _parts(len(models), len(p_m))
+    ]
+    return np.concatenate(counts)
 
 
 def conforming_pairs(model: Sim2, p_m: Points, q_m: Points, limit_m: float) -> Cells:
@@ -53,6 +70,14 @@ def conforming_pairs(model: Sim2, p_m: Points, q_m: Points, limit_m: float) -> C
     nearest = np.argmin(squared, axis=1)
     ones = np.flatnonzero(squared[np.arange(len(p_m)), nearest] < limit_m**2)
     return np.stack([ones, nearest[ones]], axis=1).astype(np.intp)
+
+
+def refitted(model: Sim2, p_m: Points, q_m: Points) -> Sim2:
+    """Return the similarity of least squares of pairs that conform to a model; the model itself if they are too few.
+
+    A model is that of two pairs alone, whose own errors are in its scale and turn.
+    """
+    return model if len(p_m) < _MIN_PAIRS else least_squares(p_m, q_m, scaled=True)
 
 
 def best_models(models: Models, counts: Counts, at_m: Points, most: int, apart_m: float) -> list[Sim2]:
@@ -82,8 +107,8 @@ def best_models(models: Models, counts: Counts, at_m: Points, most: int, apart_m
     return [models.one(index) for index, _ in kept]
 
 
-class _Near:
-    """Tells which points have some point of a set within a distance: a look-up in a raster."""
+class _Distance:
+    """The distance from any point to the nearest of a set: a look-up in a raster, exact to about its cells."""
 
     def __init__(self, points_m: Points, limit_m: float) -> None:
         self._low = points_m.min(axis=0) - 2 * limit_m
@@ -93,20 +118,19 @@ class _Near:
         raster = np.full((rows, cols), 255, np.uint8)
         col, row = np.floor((points_m - self._low) / self._cell_m).astype(np.intp).T
         raster[row, col] = 0
-        distance = cv2.distanceTransform(raster, cv2.DIST_L2, cv2.DIST_MASK_5)
-        near = distance * self._cell_m < limit_m
+        self._distance_m = np.asarray(cv2.distanceTransform(raster, cv2.DIST_L2, cv2.DIST_MASK_5), np.float32)
+        self._distance_m *= np.float32(self._cell_m)
         # a frame that is near nothing, for what lies outside
-        near[[0, -1]] = near[:, [0, -1]] = False
-        self._near = near
+        self._distance_m[[0, -1]] = self._distance_m[:, [0, -1]] = np.inf
 
-    def at(self, points_m: NDArray[np.float64]) -> NDArray[np.bool_]:
-        rows, cols = self._near.shape
+    def at(self, points_m: Numbers) -> NDArray[np.float32]:
+        rows, cols = self._distance_m.shape
         cell = np.floor((points_m - self._low) / self._cell_m)
         col = np.clip(cell[..., 0], 0, cols - 1).astype(np.intp)
         row = np.clip(cell[..., 1], 0, rows - 1).astype(np.intp)
-        return np.asarray(self._near[row, col], np.bool_)
+        return np.asarray(self._distance_m[row, col], np.float32)
 
 
-def _parts(models: Models, points: int) -> list[Models]:
+def _parts(models: int, points: int) -> list[slice]:
     size = max(1, _CHUNK // max(1, points))
-    return [models[np.arange(low, min(low + size, len(models)))] for low in range(0, len(models), size)]
+    return [slice(low, low + size) for low in range(0, models, size)]

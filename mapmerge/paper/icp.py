@@ -15,16 +15,27 @@ _STILL_M = 1e-4
 _STILL_RAD = 1e-5
 
 
-def least_squares(p_m: Points, q_m: Points) -> Sim2:
-    """Return R, t of least Σ ‖q_i − (R p_i + t)‖² (equation 24), in closed form."""
+def least_squares(p_m: Points, q_m: Points, *, scaled: bool = False) -> Sim2:
+    """Return R, t of least Σ ‖q_i − (R p_i + t)‖² (equation 24), in closed form; with ``scaled``, s as well."""
     p_mean, q_mean = p_m.mean(axis=0), q_m.mean(axis=0)
     p, q = p_m - p_mean, q_m - q_mean
-    yaw_rad = math.atan2(float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()), float((p * q).sum()))
-    turned_x, turned_y = Sim2(yaw_rad=yaw_rad).apply_point(*p_mean.tolist())
-    return Sim2(float(q_mean[0]) - turned_x, float(q_mean[1]) - turned_y, yaw_rad)
+    cross, dot = float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()), float((p * q).sum())
+    spread = float(np.square(p).sum())
+    scale = math.hypot(cross, dot) / spread if scaled and spread > 0.0 else 1.0
+    turn = Sim2(yaw_rad=math.atan2(cross, dot), scale=scale or 1.0)
+    x_m, y_m = turn.apply_point(*p_mean.tolist())
+    return Sim2(float(q_mean[0]) - x_m, float(q_mean[1]) - y_m, turn.yaw_rad, turn.scale)
 
 
-def icp(target: PreparedMap, occupied_m: Points, start: Sim2, reject_m: Sequence[float], iterations: int) -> Sim2:
+def icp(
+    target: PreparedMap,
+    occupied_m: Points,
+    start: Sim2,
+    reject_m: Sequence[float],
+    iterations: int,
+    *,
+    scale_range: tuple[float, float] | None = None,
+) -> Sim2:
     """Return T_ICP × T_RANSAC, which brings the occupied cells of two maps together.
 
     Parameters
@@ -34,12 +45,15 @@ def icp(target: PreparedMap, occupied_m: Points, start: Sim2, reject_m: Sequence
     occupied_m
         The source's occupied cells P_occ in its grid frame, shape (N, 2).
     start
-        T_RANSAC, ``target_from_source``; its scale is kept.
+        T_RANSAC, ``target_from_source``.
     reject_m
         Pairs further apart than this are left out, in turn. The paper states no such distance; without one, walls
         that only one map shows pull good alignments away.
     iterations
         At most so many at each of these distances.
+    scale_range
+        If given, the scale is aligned as well, as long as it stays within; else that of ``start`` is kept, as in
+        equation 24.
     """
     pose = start
     if len(target.wall_cells_m) == 0 or len(occupied_m) == 0:
@@ -51,14 +65,19 @@ def icp(target: PreparedMap, occupied_m: Points, start: Sim2, reject_m: Sequence
             near = np.square(nearest_m - points_m).sum(axis=1) <= limit_m**2
             if int(np.count_nonzero(near)) < _MIN_PAIRS:
                 return pose
-            step = least_squares(points_m[near], nearest_m[near])
-            moved = step @ pose
-            pose = Sim2(moved.x_m, moved.y_m, moved.yaw_rad, start.scale)
-            if math.hypot(*(step.apply(points_m[near]) - points_m[near]).mean(axis=0)) < _STILL_M and (
-                abs(step.yaw_rad) < _STILL_RAD
-            ):
+            motion = least_squares(points_m[near], nearest_m[near], scaled=scale_range is not None)
+            if scale_range is not None and not scale_range[0] <= (motion @ pose).scale <= scale_range[1]:
+                motion = least_squares(points_m[near], nearest_m[near])
+            pose = motion @ pose
+            if _is_still(motion, points_m[near]):
                 break
     return pose
+
+
+def _is_still(motion: Sim2, points_m: Points) -> bool:
+    shift_m = (motion.apply(points_m) - points_m).mean(axis=0)
+    turned = abs(motion.yaw_rad) + abs(motion.scale - 1.0)
+    return float(np.hypot(*shift_m)) < _STILL_M and turned < _STILL_RAD
 
 
 def nearest_walls(target: PreparedMap, points_m: Points) -> Points:

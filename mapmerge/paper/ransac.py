@@ -41,7 +41,7 @@ class Models:
     def __len__(self) -> int:
         return len(self.scale)
 
-    def __getitem__(self, kept: NDArray[np.bool_] | NDArray[np.intp]) -> Models:
+    def __getitem__(self, kept: NDArray[np.bool_] | slice) -> Models:
         return Models(self.scale[kept], self.turn_rad[kept], self.shift_m[kept])
 
     def one(self, index: int) -> Sim2:

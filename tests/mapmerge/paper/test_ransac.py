@@ -14,6 +14,8 @@ from mapmerge.paper.consensus import (
     conforming_features,
     conforming_pairs,
     conforming_to,
+    limits_m,
+    refitted,
 )
 from mapmerge.paper.features import all_pairs, nearest_pairs, one_a_place, sift
 from mapmerge.paper.icp import icp, least_squares
@@ -27,6 +29,11 @@ RIGID = Bounds(scale=(0.97, 1.03), turn_rad=0.3, turn_step_rad=math.pi / 2, turn
 
 def scattered(count, seed=0, size_m=20.0):
     return np.random.default_rng(seed).uniform(0.0, size_m, (count, 2))
+
+
+def best(models, p, q, *, in_both=True):
+    counts = conforming_features(models, p, q, limits_m(models, 0.2, in_both=in_both))
+    return best_models(models, counts, p, 1, 0.75)[0]
 
 
 class TestModels:
@@ -52,7 +59,7 @@ class TestModels:
         q[:210] = rng.uniform(-30.0, 40.0, (210, 2))
         pairs = np.stack([np.arange(300)] * 2, axis=1)
         models = drawn_models(p, q, pairs, ANY, draws, 0)
-        counts = conforming(models, p, q, pairs, 0.2)
+        counts = conforming(models, p, q, pairs, limits_m(models, 0.2, in_both=False))
         found = best_models(models, counts, p, 1, 0.75)[0]
         position_m, angle_deg = errors(found, true, (10.0, 10.0))
         assert position_m < 0.2
@@ -65,11 +72,18 @@ class TestModels:
         p, rng = scattered(60), np.random.default_rng(2)
         q = np.vstack([rng.permutation(true.apply(p)[:25]) + rng.normal(0.0, 0.03, (25, 2)), scattered(40, 3)])
         models = models_of_all_pairs(p, q, RIGID, 30_000, 0)
-        found = best_models(models, conforming_features(models, p, q, 0.2), p, 1, 0.75)[0]
+        found = best(models, p, q)
         position_m, angle_deg = errors(found, true, (10.0, 10.0))
         assert position_m < 0.25
         assert angle_deg < 1.0
         assert len(conforming_pairs(found, p, q, 0.2)) >= 20
+
+    def test_a_model_is_refitted_to_the_pairs_that_conform(self):
+        true = Sim2(3.0, -2.0, 0.7, 1.6)
+        p = scattered(30)
+        rough = Sim2(3.02, -2.03, 0.705, 1.59)
+        assert refitted(rough, p, true.apply(p)).apply(p) == pytest.approx(true.apply(p), abs=1e-9)
+        assert refitted(rough, p[:2], true.apply(p[:2])) == rough
 
     def test_all_models_are_within_their_bounds(self):
         models = models_of_all_pairs(scattered(40), scattered(40, 1), RIGID, 10_000, 0)
@@ -82,8 +96,7 @@ class TestModels:
         """Why scale is bounded: many features of one map fall into one neighbourhood of the other."""
         p, q = scattered(60), np.vstack([scattered(30, 1), scattered(12, 2, size_m=0.4) + 10.0])
         models = models_of_all_pairs(p, q, ANY, 50_000, 0)
-        found = best_models(models, conforming_features(models, p, q, 0.2), p, 1, 0.75)[0]
-        assert found.scale < 0.2
+        assert best(models, p, q, in_both=False).scale < 0.2
 
     def test_equal_seeds_give_equal_models(self):
         one, other, third = (
@@ -101,11 +114,12 @@ class TestModels:
     def test_the_best_models_are_distinct(self):
         p = scattered(30)
         models = models_of_all_pairs(p, Sim2(1.0, 1.0).apply(p), Bounds(scale=(0.97, 1.03)), 20_000, 0)
-        best = best_models(models, conforming_features(models, p, Sim2(1.0, 1.0).apply(p), 0.2), p, 6, 0.75)
-        assert len(best) == 6
+        counts = conforming_features(models, p, Sim2(1.0, 1.0).apply(p), limits_m(models, 0.2, in_both=True))
+        distinct = best_models(models, counts, p, 6, 0.75)
+        assert len(distinct) == 6
         corners = np.array([p.min(axis=0), p.max(axis=0)])
-        for index, one in enumerate(best):
-            for other in best[:index]:
+        for index, one in enumerate(distinct):
+            for other in distinct[:index]:
                 assert np.abs(one.apply(corners) - other.apply(corners)).max() > 0.75
 
 
@@ -158,16 +172,21 @@ class TestIcp:
 
     def test_walls_of_one_map_alone_pull_only_without_a_limit(self):
         target = prepared_map(flat())
-        own = scattered(1500, size_m=1.5) + (4.0, 7.5)
+        own = Sim2(4.0, 7.5).apply(scattered(1500, size_m=1.5))
         points = np.vstack([target.wall_cells_m, own])
         bounded = icp(target, points, Sim2(), (0.6, 0.3), 30)
         literal = icp(target, points, Sim2(), (1000.0,), 30)
         assert errors(bounded, Sim2(), (4.0, 3.0))[0] < 0.05
         assert errors(literal, Sim2(), (4.0, 3.0))[0] > 0.2
 
-    def test_the_scale_is_kept(self):
+    def test_the_scale_is_kept_unless_it_is_free(self):
         target = prepared_map(flat())
-        assert icp(target, target.wall_cells_m, Sim2(0.1, 0.0, 0.0, 1.01), (0.6,), 30).scale == 1.01
+        start = Sim2(0.1, 0.0, 0.0, 1.01)
+        assert icp(target, target.wall_cells_m, start, (0.6,), 30).scale == 1.01
+        found = icp(target, target.wall_cells_m, start, (0.6, 0.3), 30, scale_range=(0.5, 2.0))
+        assert found.scale == pytest.approx(1.0, abs=0.002)
+        held = icp(target, target.wall_cells_m, start, (0.6, 0.3), 30, scale_range=(1.005, 2.0))
+        assert 1.005 <= held.scale <= 1.01
 
     def test_without_walls_the_start_is_kept(self):
         target = prepared_map(flat())
