@@ -14,7 +14,7 @@ from mapmerge.match.base import Match
 from mapmerge.paper.consensus import best_models, conforming_features, conforming_pairs, limits_m, refitted
 from mapmerge.paper.correction import Correction, correct, picture_grid
 from mapmerge.paper.features import Features, one_a_place, sift
-from mapmerge.paper.icp import icp
+from mapmerge.paper.icp import OccupiedCells, icp, occupied_cells
 from mapmerge.paper.ransac import models_of_all_pairs
 from mapmerge.paper.show import correction_evidence, pairs_evidence
 from mapmerge.paper.stitch import (
@@ -43,6 +43,7 @@ class _Prepared:
     """
 
     map: PreparedMap
+    occupied: OccupiedCells
     correction: Correction
     features: Features
     features_m: Points
@@ -57,9 +58,9 @@ class PaperMatcher:
         picture = picture_grid(grid, config.search.working_cell_m, paper.max_side_cells, config.cells)
         correction = correct(picture, config.cells, paper)
         features = one_a_place(sift(correction.thickened, 0, paper.max_features))
-        return _Prepared(
-            prepare(grid, resolution_m, config), correction, features, correction.in_grid_m(features.pixels)
-        )
+        prepared = prepare(grid, resolution_m, config)
+        occupied = occupied_cells(prepared.wall_cells_m, prepared.resolution_m)
+        return _Prepared(prepared, occupied, correction, features, correction.in_grid_m(features.pixels))
 
     def match(self, target: _Prepared, source: _Prepared, config: MergeConfig, prior: Prior | None = None) -> Match:
         """Return where the source lies on the target by RANSAC on all pairs of features, then ICP."""
@@ -89,8 +90,8 @@ class PaperMatcher:
             fitted = refitted(model, p_m[inliers[:, 0]], q_m[inliers[:, 1]])
             start = with_known_scale(fitted, config, p_m[inliers[:, 0]])
             return icp(
-                target.map,
-                source.map.wall_cells_m,
+                target.occupied,
+                source.occupied.cells_m,
                 start,
                 paper.icp_reject_m,
                 paper.icp_iterations,

@@ -18,7 +18,7 @@ from mapmerge.paper.consensus import (
     refitted,
 )
 from mapmerge.paper.features import all_pairs, nearest_pairs, one_a_place, sift
-from mapmerge.paper.icp import icp, least_squares
+from mapmerge.paper.icp import icp, least_squares, occupied_cells
 from mapmerge.paper.ransac import Bounds, drawn_models, models_of_all_pairs, two_pair_models
 from mapmerge.sim2 import Sim2
 from tests.floors import errors, flat, prepared_map
@@ -164,30 +164,37 @@ class TestIcp:
     @pytest.mark.parametrize("start", [Sim2(0.15, -0.1, 0.02), Sim2(-0.2, 0.0, -0.025), Sim2()])
     def test_a_small_error_is_mended(self, start):
         target, source = prepared_map(flat()), prepared_map(flat(ragged=1))
+        cells = occupied_cells(target.wall_cells_m, 0.05)
         true = target.grid.map_from_grid.inverse() @ source.grid.map_from_grid
-        found = icp(target, source.wall_cells_m, start @ true, (0.6, 0.3), 30)
+        found = icp(cells, source.wall_cells_m, start @ true, (0.6, 0.3), 30)
         position_m, angle_deg = errors(found, true, (4.0, 3.0))
         assert position_m < 0.05
         assert angle_deg < 0.5
 
     def test_walls_of_one_map_alone_pull_only_without_a_limit(self):
-        target = prepared_map(flat())
+        target = occupied_cells(prepared_map(flat()).wall_cells_m, 0.05)
         own = Sim2(4.0, 7.5).apply(scattered(1500, size_m=1.5))
-        points = np.vstack([target.wall_cells_m, own])
+        points = np.vstack([target.cells_m, own])
         bounded = icp(target, points, Sim2(), (0.6, 0.3), 30)
         literal = icp(target, points, Sim2(), (1000.0,), 30)
         assert errors(bounded, Sim2(), (4.0, 3.0))[0] < 0.05
         assert errors(literal, Sim2(), (4.0, 3.0))[0] > 0.2
 
     def test_the_scale_is_kept_unless_it_is_free(self):
-        target = prepared_map(flat())
+        target = occupied_cells(prepared_map(flat()).wall_cells_m, 0.05)
         start = Sim2(0.1, 0.0, 0.0, 1.01)
-        assert icp(target, target.wall_cells_m, start, (0.6,), 30).scale == 1.01
-        found = icp(target, target.wall_cells_m, start, (0.6, 0.3), 30, scale_range=(0.5, 2.0))
+        assert icp(target, target.cells_m, start, (0.6,), 30).scale == 1.01
+        found = icp(target, target.cells_m, start, (0.6, 0.3), 30, scale_range=(0.5, 2.0))
         assert found.scale == pytest.approx(1.0, abs=0.002)
-        held = icp(target, target.wall_cells_m, start, (0.6, 0.3), 30, scale_range=(1.005, 2.0))
+        held = icp(target, target.cells_m, start, (0.6, 0.3), 30, scale_range=(1.005, 2.0))
         assert 1.005 <= held.scale <= 1.01
 
     def test_without_walls_the_start_is_kept(self):
-        target = prepared_map(flat())
+        target = occupied_cells(prepared_map(flat()).wall_cells_m, 0.05)
         assert icp(target, np.empty((0, 2)), Sim2(1.0), (0.6,), 30) == Sim2(1.0)
+
+    def test_the_nearest_occupied_cell_is_found_wherever_a_point_lies(self):
+        cells_m = (np.array([[2, 1], [9, 1], [2, 7]]) + 0.5) * 0.05
+        target = occupied_cells(cells_m, 0.05)
+        points = np.array([[0.1, 0.05], [0.5, 0.1], [0.1, 0.4], [99.0, 0.0], [0.0, 99.0], [-99.0, -99.0]])
+        assert np.array_equal(target.nearest_to(points), cells_m[[0, 1, 2, 1, 2, 0]])
