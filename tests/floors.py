@@ -13,6 +13,7 @@ from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.match import Match, Matcher
 from mapmerge.prepare import PreparedMap, prepare
+from mapmerge.prior import Prior
 from mapmerge.sim2 import IDENTITY, Sim2, wrap_angle
 from samples.drive import Pace, follow, route, stops, survey, tour, window
 from samples.floorplan import FloorStyle, look_alike_corridor, office_floor
@@ -192,6 +193,34 @@ def flat(
     )
 
 
+HALL_WALLS = [
+    *outline(0.0, 0.0, 60.0, 40.0),
+    (10.0, 0.0, 10.1, 9.0),
+    (4.0, 6.0, 7.0, 6.1),
+    (45.0, 30.0, 45.1, 40.0),
+    (45.0, 30.0, 52.0, 30.1),
+    (50.0, 34.0, 50.6, 36.0),
+    (3.0, 31.0, 12.0, 31.1),
+    (8.0, 33.0, 8.1, 40.0),
+    (48.0, 0.0, 48.1, 8.0),
+    (52.0, 5.0, 60.0, 5.1),
+    (25.0, 17.0, 34.0, 17.1),
+    (31.0, 17.0, 31.1, 25.0),
+]
+
+
+def hall_and_part(corner_m: tuple[float, float], yaw_rad: float) -> tuple[Grid, Grid, Sim2]:
+    """Return a hall of 60 × 40 m, a part of 13 × 11 m of it mapped in another frame, and where that lies in the hall."""
+    x_m, y_m = corner_m
+    hall_from_part = Sim2(x_m + 6.5, y_m + 5.5, yaw_rad) @ Sim2(-9.0, -9.0)
+    hall = drawn(within(0.0, 0.0, 60.0, 40.0), HALL_WALLS, size_m=(61.0, 41.0), floor_from_map=Sim2(-0.5, -0.5))
+    known = within(x_m, y_m, x_m + 13.0, y_m + 11.0)
+    part = drawn(known, HALL_WALLS, size_m=(18.0, 18.0), floor_from_map=hall_from_part)
+    known_m = hall_from_part.apply(part.centres_m(np.ones(part.cells.shape, np.bool_))).T
+    cells = np.where(known(*known_m).reshape(part.cells.shape), part.cells, UNKNOWN).astype(np.int8)
+    return hall, Grid(cells, part.resolution_m), Sim2(-0.5, -0.5).inverse() @ hall_from_part
+
+
 def filled(value: int, rows: int, cols: int, resolution_m: float = 0.05) -> Grid:
     return Grid(np.full((rows, cols), value, np.int8), resolution_m)
 
@@ -207,11 +236,13 @@ def errors(found: Sim2, true: Sim2, at_m: tuple[float, float]) -> tuple[float, f
     return math.hypot(x_m - true_x_m, y_m - true_y_m), abs(math.degrees(turn_rad))
 
 
-def match_grids(matcher: Matcher, target: Grid, source: Grid, config: MergeConfig = CONFIG) -> Match:
+def match_grids(
+    matcher: Matcher, target: Grid, source: Grid, config: MergeConfig = CONFIG, prior: Prior | None = None
+) -> Match:
     """Match two maps at the resolution that the merger would take."""
     resolution_m = max(config.search.working_cell_m, target.resolution_m, source.resolution_m)
     prepared = [matcher.prepare(grid, resolution_m, config) for grid in (target, source)]
-    return matcher.match(*prepared, config)
+    return matcher.match(*prepared, config, prior)
 
 
 def prepared_map(grid: Grid, config: MergeConfig = CONFIG) -> PreparedMap:

@@ -204,9 +204,9 @@ def _surface(pair: PairOfMaps, found: _Found, config: MergeConfig) -> Evidence:
     return SurfaceEvidence(
         step="correlation_surface",
         title=f"Correlation of walls and free space, one map turned by {math.degrees(turn.yaw_rad):.1f}°",
-        values=surface.centred(),
-        marks=tuple(surface.centred_index(placement_of(pose)) for pose in found.rivals.poses[same_turn]),
-        chosen=surface.centred_index(found.best),
+        values=surface.values,
+        marks=tuple(surface.index(placement_of(pose)) for pose in found.rivals.poses[same_turn]),
+        chosen=surface.index(found.best),
     )
 
 
