@@ -12,6 +12,8 @@ import numpy as np
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.match import Match, Matcher
+from mapmerge.match.correlation import CorrelationMatcher
+from mapmerge.match.pair import DescribedMap, PairOfMaps
 from mapmerge.prepare import PreparedMap, prepare
 from mapmerge.prior import Prior
 from mapmerge.sim2 import IDENTITY, Sim2, wrap_angle
@@ -193,6 +195,28 @@ def flat(
     )
 
 
+LINE_M = np.stack([np.linspace(0.0, 10.0, 101), np.full(101, 2.0)], axis=1)
+FEW_POINTS = {
+    "no points": np.empty((0, 2)),
+    "one point": np.array([[1.0, 2.0]]),
+    "one point, often": np.tile([[1.0, 2.0]], (40, 1)),
+    "two points": np.array([[1.0, 2.0], [1.5, 2.0]]),
+    "a line": LINE_M,
+    "an oblique line": Sim2(yaw_rad=0.7).apply(LINE_M),
+}
+
+
+def walls_of_the_flat(seed: int, yaw_rad: float = 0.0, share: float = 1.0) -> np.ndarray:
+    """Return noisy points on the flat's walls, turned about the origin; of a part of the flat if ``share`` < 1."""
+    rng = np.random.default_rng(seed)
+    points = []
+    for x0_m, y0_m, x1_m, y1_m in FLAT_WALLS:
+        count = int(20 * ((x1_m - x0_m) + (y1_m - y0_m)))
+        points.append(rng.uniform((x0_m, y0_m), (x1_m, y1_m), (count, 2)))
+    walls_m = np.vstack(points) + rng.normal(0.0, 0.02, (sum(map(len, points)), 2))
+    return Sim2(yaw_rad=yaw_rad).apply(walls_m[walls_m[:, 0] <= share * FLAT_M[0]])
+
+
 HALL_WALLS = [
     *outline(0.0, 0.0, 60.0, 40.0),
     (10.0, 0.0, 10.1, 9.0),
@@ -219,6 +243,20 @@ def hall_and_part(corner_m: tuple[float, float], yaw_rad: float) -> tuple[Grid, 
     known_m = hall_from_part.apply(part.centres_m(np.ones(part.cells.shape, np.bool_))).T
     cells = np.where(known(*known_m).reshape(part.cells.shape), part.cells, UNKNOWN).astype(np.int8)
     return hall, Grid(cells, part.resolution_m), Sim2(-0.5, -0.5).inverse() @ hall_from_part
+
+
+def with_another_label(grid: Grid, factor: float) -> Grid:
+    """Return the same cells, whose side is said to be so many times what it is; the origin is scaled as well."""
+    pose = grid.map_from_grid
+    return Grid(grid.cells, grid.resolution_m * factor, Sim2(pose.x_m * factor, pose.y_m * factor, pose.yaw_rad))
+
+
+def described(grid: Grid, config: MergeConfig = CONFIG) -> DescribedMap:
+    return CorrelationMatcher().prepare(grid, max(config.search.working_cell_m, grid.resolution_m), config)
+
+
+def pair_of_maps(target: Grid, source: Grid, prior: Prior | None = None) -> PairOfMaps:
+    return PairOfMaps(described(target), described(source), prior)
 
 
 def filled(value: int, rows: int, cols: int, resolution_m: float = 0.05) -> Grid:
