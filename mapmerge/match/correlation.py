@@ -73,7 +73,7 @@ class CorrelationMatcher:
         if prior is not None and not match.accepted:
             elsewhere = _matched(PairOfMaps(first, second), config)
             if elsewhere.accepted:
-                match = contradicted(match, elsewhere, prior, pair)
+                match = contradicted(match, elsewhere, prior, pair, config.verify)
         return _inverted(match) if swapped else match
 
 
