@@ -116,9 +116,9 @@ class SearchConfig(_Settings):
     sweep_free_weights: tuple[float, ...] = (1.0,)
     sweep_shifts: int = 4
     scale_step: float = 1.05
-    clear_agreement: float = 0.85
+    clear_agreement: float = 0.9
     clear_wall_m: float = 10.0
-    clear_likeness: float = 0.6
+    clear_likeness: float = 0.5
     working_cell_m: float = 0.05
 
     def __post_init__(self) -> None:
@@ -187,6 +187,9 @@ class VerifyConfig(_Settings):
         of them agrees; else ambiguity, if a rival is more than so many times as good.
     min_confidence
         Least calibrated probability that the placement is right, where the method states one.
+    hopeful_confidence
+        Merged maps of several robots are matched with another robot's if the confidence of any pair of them, which is
+        too low by itself, is at least this.
     distinct_m, distinct_rad
         Placements that differ by more than one of these are rivals, not the same.
     """
@@ -201,6 +204,7 @@ class VerifyConfig(_Settings):
     poor_agreement: float = 0.8
     rival_likeness: float = 0.5
     min_confidence: float = 0.999
+    hopeful_confidence: float = 0.05
     distinct_m: float = 0.75
     distinct_rad: float = math.radians(5.0)
 

@@ -20,6 +20,7 @@ from mapmerge.outcome import Change, Pair, RobotOutcome, Status, changes_of, out
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
+from mapmerge.unite import Unions, united
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +70,8 @@ class MergeState:
         Middle of what each map knows, in its map frame: where placements are compared.
     reported
         Placements as they were last reported in a change.
+    unions
+        What the matcher said of merged maps.
     """
 
     result: MergeResult
@@ -76,6 +79,7 @@ class MergeState:
     prepared: Mapping[tuple[str, float], Any] = field(default_factory=dict)
     centres_m: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     reported: Mapping[str, Sim2] = field(default_factory=dict)
+    unions: Unions = field(default_factory=Unions)
 
     @staticmethod
     def initial(robots: Sequence[str]) -> MergeState:
@@ -135,9 +139,9 @@ def step(
     }
     maps = {robot: grid for robot, grid in grids.items() if grid.known.any()}
     believed = _pair_priors(robots[0], list(combinations(maps, 2)), priors or {}, state.result.priors)
-    matches, prepared = _matched(state, maps, updated, config, believed)
+    alone, prepared = _matched(state, maps, updated, config, believed)
     centres_m = {robot: _centre_m(maps[robot]) if robot in updated else state.centres_m[robot] for robot in maps}
-    forest = _placed(centres_m, matches, config)
+    matches, forest, unions = _linked(state.unions.without(updated), maps, centres_m, alone, config)
     pairs = _without_contradicted(matches, forest)
     layers = _layers(robots[0], maps, forest)
     fusion = fuse(list(layers.values()), grids[robots[0]], config.cells) if layers else None
@@ -145,7 +149,7 @@ def step(
     changes, reported = changes_of(robots[0], outcomes, state.reported, centres_m, config)
     merged = fusion.grid if fusion else None
     result = MergeResult(outcomes, grids, pairs, believed, merged, updated, changes)
-    return MergeState(result, matches, prepared, centres_m, reported), result
+    return MergeState(result, alone, prepared, centres_m, reported, unions), result
 
 
 def _is_new(update: Grid | None, known: Grid | None) -> bool:
@@ -195,6 +199,25 @@ def _prior_of(pair: Pair, reference: str, priors: Mapping[str, Prior]) -> Prior 
     if source not in priors or (target != reference and target not in priors):
         return None
     return priors[source] if target == reference else priors[target].inverse().compose(priors[source])
+
+
+def _linked(
+    unions: Unions,
+    maps: Mapping[str, Grid],
+    centres_m: Mapping[str, tuple[float, float]],
+    alone: Mapping[Pair, Match],
+    config: MergeConfig,
+) -> tuple[dict[Pair, Match], Forest, Unions]:
+    """Place robots by the matches of pairs, then those that only merged maps can place, one after the other."""
+    matcher = load_matcher(config.method)
+    matches = dict(alone)
+    forest = _placed(centres_m, matches, config)
+    while True:
+        found, unions = united(forest, maps, alone, unions, matcher, config)
+        if found is None:
+            return matches, forest, unions
+        matches[found[0]] = found[1]
+        forest = _placed(centres_m, matches, config)
 
 
 def _placed(centres_m: Mapping[str, tuple[float, float]], pairs: Mapping[Pair, Match], config: MergeConfig) -> Forest:

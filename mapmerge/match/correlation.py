@@ -84,8 +84,7 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
     if found is None:
         reason = Reason(ReasonCode.NO_CANDIDATE, "no placement lets walls of the two maps coincide")
         return Match(None, None, accepted=False, reason=reason, evidence=(_spectra(pair, rotations),))
-    rival_score_m = float(found.rivals.scores_m[0]) if len(found.rivals.scores_m) else None
-    cues = cues_of(pair, found.best, found.scores, rival_score_m, config.verify)
+    cues = cues_of(pair, found.best, found.scores, found.rivals, config.verify)
     sure = confidence(cues)
     reason = judge(found.scores, cues, sure, config.verify)
     return Match(
@@ -130,9 +129,9 @@ def _ranked(pair: PairOfMaps, seen: Look, scales: tuple[float, float], config: M
     if not pair.allowed(poses_of([best])).all():
         best = placement_of(seen.poses[0])
     near = beside(pair, seen.poses[:1], scales, config)
-    others = Look(seen.poses[1:], seen.scores_m[1:]).joined(near)
-    ranked = Look(np.vstack([poses_of([best]), others.poses]), np.concatenate([seen.scores_m[:1], others.scores_m]))
-    return _Found(best, verify(target, source, best, config.verify), rivals(ranked, pair, config.verify))
+    first = replace(seen.rows(slice(0, 1)), poses=poses_of([best]))
+    others = seen.rows(slice(1, None)).joined(near)
+    return _Found(best, verify(target, source, best, config.verify), rivals(first, others, pair, config.verify))
 
 
 def _is_clear(found: _Found, config: MergeConfig) -> bool:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mapmerge.align import Poses, placed, poses_of
 from mapmerge.config import VerifyConfig
+from mapmerge.match.look import Look
 from mapmerge.match.pair import PairOfMaps
 from mapmerge.prepare import PreparedMap
 from mapmerge.score import agreement, probe
@@ -32,6 +33,8 @@ class Cues:
         Score of the best distinct rival over that of the placement, 0 to 1.
     lead_m
         Score of the placement less that of its best distinct rival.
+    rival_agreement
+        Largest wall agreement of rivals that match about as much wall as a placement must; 0 if there is none.
     acceptance
         Acceptance index ω.
     overlap_m2, overlap_fraction
@@ -50,6 +53,7 @@ class Cues:
     far_share: float
     likeness: float
     lead_m: float
+    rival_agreement: float
     acceptance: float
     overlap_m2: float
     overlap_fraction: float
@@ -58,9 +62,7 @@ class Cues:
     tight_share: float
 
 
-def cues_of(
-    pair: PairOfMaps, target_from_source: Sim2, scores: Scores, rival_score_m: float | None, config: VerifyConfig
-) -> Cues:
+def cues_of(pair: PairOfMaps, target_from_source: Sim2, scores: Scores, rivals: Look, config: VerifyConfig) -> Cues:
     """Return the cues of a placement between the grid frames."""
     target, source = pair.target.map, pair.source.map
     pose = poses_of([target_from_source])
@@ -68,7 +70,8 @@ def cues_of(
     found = agreement(target, source, pose, probe(source, most, 1), probe(target, most, 1))
     judged_m = sum(float(tally.matched_m[0] + tally.violated_m[0]) for tally in (found.ahead, found.back))
     far_m = float(found.ahead.far_m[0] + found.back.far_m[0])
-    rival_m = 0.0 if rival_score_m is None else max(0.0, rival_score_m)
+    rival_m = max(0.0, float(rivals.scores_m[0])) if len(rivals.scores_m) else 0.0
+    substantial = rivals.matched_m >= config.min_matched_wall_m
     aligned, held_m, tight_share = _fit(target, source, pose, config)
     return Cues(
         matched_wall_m=scores.matched_wall_m,
@@ -77,6 +80,7 @@ def cues_of(
         far_share=far_m / judged_m if judged_m > 0 else 0.0,
         likeness=min(1.0, rival_m / scores.score_m) if scores.score_m > 0 else 1.0,
         lead_m=max(0.0, scores.score_m - rival_m),
+        rival_agreement=float(rivals.shares[substantial].max(initial=0.0)),
         acceptance=scores.acceptance,
         overlap_m2=scores.overlap_m2,
         overlap_fraction=scores.overlap_fraction,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from mapmerge.score import agreement, probe
 from mapmerge.sim2 import wrap_angle
 
 _SAME_M, _SAME_RAD = 0.3, math.radians(2.0)
+_DISTINCT_SIZE = 0.05
 _BESIDE = 1.2
 _BESIDE_TURNS = 8
 
@@ -29,14 +31,30 @@ class Look:
         Shape (C, 4).
     scores_m
         Their scores, see `VerifyConfig.violation_weight`, shape (C,).
+    matched_m
+        Length of the walls that agree, mean of both directions, shape (C,).
+    shares
+        Share of the walls that agree, in the worse of both directions, shape (C,).
     """
 
     poses: Poses
     scores_m: NDArray[np.float64]
+    matched_m: NDArray[np.float64]
+    shares: NDArray[np.float64]
+
+    def rows(self, chosen: Sequence[int] | slice) -> Look:
+        """Return some of the placements."""
+        return Look(self.poses[chosen], self.scores_m[chosen], self.matched_m[chosen], self.shares[chosen])
 
     def joined(self, other: Look) -> Look:
         """Return the placements of both, best first."""
-        return _best_first(np.vstack([self.poses, other.poses]), np.concatenate([self.scores_m, other.scores_m]))
+        both = Look(
+            np.vstack([self.poses, other.poses]),
+            np.concatenate([self.scores_m, other.scores_m]),
+            np.concatenate([self.matched_m, other.matched_m]),
+            np.concatenate([self.shares, other.shares]),
+        )
+        return both.rows(np.argsort(-both.scores_m, kind="stable").tolist())
 
 
 def look(pair: PairOfMaps, starts: Poses, scales: tuple[float, float], config: MergeConfig) -> Look:
@@ -57,14 +75,14 @@ def look(pair: PairOfMaps, starts: Poses, scales: tuple[float, float], config: M
     poses = align(target, evenly(source.walls_m, limits.rough_points), starts, limits.rough_reject_m, scales=scales)
     poses = poses[pair.allowed(poses)]
     if len(poses) == 0:
-        return Look(poses, np.empty(0))
+        return scored(pair, poses, config)
     few = limits.rough_probes
     rough = agreement(target, source, poses, probe(source, few, few), probe(target, few, few))
     poses = poses[np.argsort(-rough.score_m(config.verify), kind="stable")]
     poses = poses[distinct(poses, source.walls_m, _SAME_M, _SAME_RAD, limits.survivors)]
     poses = align(target, evenly(source.walls_m, limits.points), poses, limits.reject_m, scales=scales)
     poses = poses[pair.allowed(poses)]
-    return _best_first(poses, scored(pair, poses, config))
+    return scored(pair, poses, config)
 
 
 def beside(pair: PairOfMaps, pose: Poses, scales: tuple[float, float], config: MergeConfig) -> Look:
@@ -81,20 +99,24 @@ def beside(pair: PairOfMaps, pose: Poses, scales: tuple[float, float], config: M
     walls_m = evenly(pair.source.map.walls_m, limits.rough_points)
     poses = align(pair.target.map, walls_m, starts, limits.rough_reject_m, scales=scales)
     poses = poses[pair.allowed(poses)]
-    return _best_first(poses, scored(pair, poses, config))
+    return scored(pair, poses, config)
 
 
-def scored(pair: PairOfMaps, poses: Poses, config: MergeConfig) -> NDArray[np.float64]:
-    """Return the scores of placements, shape (C,), from as many points as are used for the best ones."""
+def scored(pair: PairOfMaps, poses: Poses, config: MergeConfig) -> Look:
+    """Return placements, best first, judged by as many points as are used for the best ones."""
     target, source, most = pair.target.map, pair.source.map, config.refine.probes
     found = agreement(target, source, poses, probe(source, most, most // 2), probe(target, most, most // 2))
-    return found.score_m(config.verify)
+    matched_m = (found.ahead.matched_m + found.back.matched_m) / 2
+    shares = np.minimum(found.ahead.share, found.back.share)
+    judged = Look(poses, found.score_m(config.verify), matched_m, shares)
+    return judged.rows(np.argsort(-judged.scores_m, kind="stable").tolist())
 
 
-def rivals(found: Look, pair: PairOfMaps, config: VerifyConfig) -> Look:
-    """Return the placements, best first, each of which differs from the best one and from all better ones."""
-    kept = distinct(found.poses, pair.source.map.walls_m, config.distinct_m, config.distinct_rad, len(found.poses))[1:]
-    return Look(found.poses[kept], found.scores_m[kept])
+def rivals(best: Look, others: Look, pair: PairOfMaps, config: VerifyConfig) -> Look:
+    """Return the others, best first, each of which differs from the best one and from all better ones."""
+    poses = np.vstack([best.poses, others.poses])
+    kept = distinct(poses, pair.source.map.walls_m, config.distinct_m, config.distinct_rad, len(poses))[1:]
+    return others.rows([row - 1 for row in kept])
 
 
 def distinct(poses: Poses, walls_m: NDArray[np.float64], distance_m: float, angle_rad: float, most: int) -> list[int]:
@@ -116,11 +138,3 @@ def distinct(poses: Poses, walls_m: NDArray[np.float64], distance_m: float, angl
         ):
             kept.append(row)
     return kept
-
-
-_DISTINCT_SIZE = 0.05
-
-
-def _best_first(poses: Poses, scores_m: NDArray[np.float64]) -> Look:
-    order = np.argsort(-scores_m, kind="stable")
-    return Look(poses[order], scores_m[order])

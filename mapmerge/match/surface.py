@@ -112,7 +112,7 @@ class TranslationSearch:
         ahead = [
             CorrelationSurface(
                 turn,
-                np.roll(_correlated(spectra, (walls, free), True), self._below, axis=(0, 1)),
+                np.roll(_correlated(spectra, walls, free, True), self._below, axis=(0, 1)),
                 first_m,
                 cell_m,
             )
@@ -121,7 +121,7 @@ class TranslationSearch:
         # turned by 180°, cell k becomes cell −k, whose far corner is the near one of before: no shift is below the first
         corner_m = (low_x_m + cell_m, low_y_m + cell_m)
         back = [
-            CorrelationSurface(half, _correlated(spectra, (walls, free), False), corner_m, cell_m)
+            CorrelationSurface(half, _correlated(spectra, walls, free, False), corner_m, cell_m)
             for spectra in self._spectra
         ]
         return (*ahead, *back)
@@ -161,6 +161,7 @@ def surface_peaks(surface: CorrelationSurface, peak_distance_m: float) -> tuple[
     return poses, surface.values[rows, cols]
 
 
-def _correlated(target: tuple[Surface, Surface], source: tuple[Surface, Surface], conjugate: bool) -> Surface:
-    walls, free = (cv2.mulSpectrums(one, other, 0, conjB=conjugate) for one, other in zip(target, source, strict=True))
-    return np.asarray(cv2.idft(walls + free, flags=cv2.DFT_REAL_OUTPUT | cv2.DFT_SCALE), np.float32)
+def _correlated(target: tuple[Surface, Surface], walls: Surface, free: Surface, conjugate: bool) -> Surface:
+    product = cv2.mulSpectrums(target[0], walls, 0, conjB=conjugate)
+    product = product + cv2.mulSpectrums(target[1], free, 0, conjB=conjugate)
+    return np.asarray(cv2.idft(product, flags=cv2.DFT_REAL_OUTPUT | cv2.DFT_SCALE), np.float32)

@@ -33,6 +33,7 @@ CUES = Cues(
     far_share=0.01,
     likeness=0.2,
     lead_m=48.0,
+    rival_agreement=0.4,
     acceptance=0.98,
     overlap_m2=40.0,
     overlap_fraction=0.6,
