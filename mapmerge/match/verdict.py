@@ -15,8 +15,10 @@ from mapmerge.verify import Scores, verify
 
 
 def too_little_structure(target: DescribedMap, source: DescribedMap, config: VerifyConfig) -> Reason | None:
-    """Return a refusal if one of the maps has fewer walls than a placement must match."""
+    """Return a refusal if one of the maps has fewer walls than a placement must match, or none at all."""
     least_m = min(target.wall_m, source.wall_m)
+    if least_m <= 0.0:
+        return Reason(ReasonCode.TOO_LITTLE_STRUCTURE, "one of the maps shows no wall at all")
     if least_m >= config.min_matched_wall_m:
         return None
     message = f"one of the maps shows {_down(least_m, 1):.1f} m of wall, less than {config.min_matched_wall_m:g} m"

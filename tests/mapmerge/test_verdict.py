@@ -112,6 +112,16 @@ class TestStructure:
             assert "5.0 m of wall" in reason.message
 
 
+    @pytest.mark.parametrize("least_m", [0.0, 8.0])
+    def test_without_a_wall_nothing_can_be_placed_whatever_is_asked_for(self, least_m):
+        rich, none = described(flat()), described(filled(0, 30, 40))
+        limits = replace(LIMITS, min_matched_wall_m=least_m)
+        for pair in ((rich, none), (none, rich), (none, none)):
+            reason = too_little_structure(*pair, limits)
+            assert reason.code is ReasonCode.TOO_LITTLE_STRUCTURE
+            assert reason.message == "one of the maps shows no wall at all"
+
+
 class TestContradicted:
     PRIOR = Prior(Sim2(5.0, 1.0, 0.3), 0.1, 0.1, 0.02, "given for r2")
     REASON = Reason(ReasonCode.WALLS_DISAGREE, "of the walls in the overlap 12% agree")
