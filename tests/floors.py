@@ -259,6 +259,21 @@ def pair_of_maps(target: Grid, source: Grid, prior: Prior | None = None) -> Pair
     return PairOfMaps(described(target), described(source), prior)
 
 
+def walled_room(
+    size_m: tuple[float, float], *, open_ends: bool, ragged: int | None = None, yaw_rad: float = 0.0
+) -> Grid:
+    """Return a room; without its short walls if its ends are open. Its map frame is the room's, whatever the turn."""
+    width_m, height_m = size_m
+    walls = outline(0.0, 0.0, *size_m)
+    side_m = math.hypot(*size_m) + 2.0
+    corner = Sim2(width_m / 2, height_m / 2, yaw_rad) @ Sim2(-side_m / 2, -side_m / 2)
+    known = within(0.0, -0.2, width_m, height_m + 0.2) if open_ends else within(-0.2, -0.2, width_m + 0.2, height_m + 0.2)
+    grid = drawn(known, walls, size_m=(side_m, side_m), floor_from_map=corner, ragged=ragged)
+    centres_m = corner.apply(grid.centres_m(np.ones(grid.cells.shape, np.bool_))).T
+    cells = np.where(known(*centres_m).reshape(grid.cells.shape), grid.cells, UNKNOWN).astype(np.int8)
+    return Grid(cells, grid.resolution_m, corner)
+
+
 def filled(value: int, rows: int, cols: int, resolution_m: float = 0.05) -> Grid:
     return Grid(np.full((rows, cols), value, np.int8), resolution_m)
 
