@@ -44,8 +44,9 @@ def of_simulation(results: Sequence[Result]) -> list[Criterion]:
         share = placed / len(inside) if inside else 0.0
         text = f"{placed} of {len(inside)}, {share:.0%}"
         found.append(Criterion(f"(b) at least {needed:.0%} placed at an {name}", share >= needed, text))
-    wrong = [item.name for item in results if item.verdict in (Verdict.WRONG, Verdict.FALSE_MERGE)]
-    found.append(Criterion(f"(b) no wrong or false merge in {len(results)} pairs", not wrong, _listed(wrong)))
+    clear = [item for item in results if not item.ambiguous]
+    wrong = [item.name for item in clear if item.verdict in (Verdict.WRONG, Verdict.FALSE_MERGE)]
+    found.append(Criterion(f"(b) no wrong or false merge in {len(clear)} clear pairs", not wrong, _listed(wrong)))
     unclear = [item for item in results if item.ambiguous]
     called = sum(item.reason == "ambiguous" for item in unclear)
     right = sum(item.verdict is Verdict.PLACED for item in unclear)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from benchmarks import tables
+from benchmarks.cases import FIRST_SEED
 from benchmarks.merged_sets import PairOutcome, SetOutcome
 from benchmarks.recordings import HELD_OUT, Course
 from benchmarks.reliability import binned, diagram
@@ -15,6 +16,15 @@ from benchmarks.verdicts import Verdict
 def show(title: str, lines: Sequence[str]) -> None:
     """Print a table."""
     print("\n".join(["", title, "", *lines]), flush=True)
+
+
+def held_out() -> list[str]:
+    """Return lines that say what no tuning has seen."""
+    return [
+        f"recordings: {', '.join(HELD_OUT)} (tuned on: intel_*, fr101_*)",
+        f"simulated pairs: all, for their seeds are {FIRST_SEED} and up",
+        "published maps: all",
+    ]
 
 
 def course_table(courses: Sequence[Course]) -> list[str]:

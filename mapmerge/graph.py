@@ -1,7 +1,8 @@
 """From matches of pairs to one consistent placement of all robots.
 
 The accepted matches are the edges of a graph. Its maximum spanning forest, by score, places the robots; an edge that
-closes a loop and contradicts it is refused, for it is weaker than all edges of the loop.
+closes a loop and misses contradicts it. An edge of the forest that several others contradict, which together weigh more
+than it, gives way: loops of many robots say which match is the wrong one.
 """
 
 from __future__ import annotations
@@ -74,6 +75,38 @@ def place(robots: Sequence[str], edges: Sequence[Edge], *, distance_m: float, an
         An edge that closes a loop contradicts it if it misses by more than one of these.
     """
     ordered = sorted(edges, key=lambda edge: (-edge.weight, robots.index(edge.target), robots.index(edge.source)))
+
+    def without(refused: Sequence[Edge]) -> Forest:
+        """Place by all edges but these; return the forest with all that contradict it, these among them."""
+        tree, loops = _spanning(robots, [edge for edge in ordered if edge not in refused])
+        placements = _walk(robots, tree)
+        missing = [
+            edge
+            for edge in (*refused, *loops)
+            if not _agrees(edge, placements, distance_m=distance_m, angle_rad=angle_rad)
+        ]
+        return Forest(placements, tuple(edge for edge in ordered if edge in missing))
+
+    refused: list[Edge] = []
+    forest = without(refused)
+    while forest.contradicted:
+        suspects = [edge for edge in ordered if edge not in forest.contradicted]
+        others = [(without([*refused, edge]), edge) for edge in suspects]
+        better, suspect = min(others, key=lambda other: _cost(other[0], robots), default=(forest, None))
+        if suspect is None or _cost(better, robots) >= _cost(forest, robots):
+            break
+        refused, forest = [*refused, suspect], better
+    return forest
+
+
+def _cost(forest: Forest, robots: Sequence[str]) -> tuple[int, float]:
+    """Return what a forest does without: links first, then the weight of the edges that contradict it."""
+    parts = len({forest.placements[robot].component for robot in robots})
+    return parts, sum(edge.weight for edge in forest.contradicted)
+
+
+def _spanning(robots: Sequence[str], ordered: Sequence[Edge]) -> tuple[list[Edge], list[Edge]]:
+    """Return the edges of the maximum spanning forest, and those that close loops."""
     group = {robot: robot for robot in robots}
     tree: list[Edge] = []
     loops: list[Edge] = []
@@ -81,11 +114,7 @@ def place(robots: Sequence[str], edges: Sequence[Edge], *, distance_m: float, an
         old, new = group[edge.source], group[edge.target]
         (loops if old == new else tree).append(edge)
         group = {robot: new if name == old else name for robot, name in group.items()}
-    placements = _walk(robots, tree)
-    contradicted = tuple(
-        edge for edge in loops if not _agrees(edge, placements, distance_m=distance_m, angle_rad=angle_rad)
-    )
-    return Forest(placements, contradicted)
+    return tree, loops
 
 
 def _walk(robots: Sequence[str], tree: Sequence[Edge]) -> dict[str, Placement]:
@@ -110,6 +139,8 @@ def _walk(robots: Sequence[str], tree: Sequence[Edge]) -> dict[str, Placement]:
 
 
 def _agrees(edge: Edge, placements: dict[str, Placement], *, distance_m: float, angle_rad: float) -> bool:
+    if placements[edge.target].component != placements[edge.source].component:
+        return False
     target = placements[edge.target].component_from_map
     placed = target.inverse() @ placements[edge.source].component_from_map
     return placed.is_close(edge.target_from_source, distance_m=distance_m, angle_rad=angle_rad, at_m=edge.at_m)

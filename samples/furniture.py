@@ -1,33 +1,43 @@
-"""Furniture as a lidar near the floor sees it: legs, feet, and the blocks that reach down.
-
-Every maker returns a `Piece`: convex polygons around its own origin. Its x axis runs along the wall it may stand
-against, with the wall towards negative y.
-"""
+"""Furniture: which pieces a room of a kind gets, and where they stand."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from mapmerge.sim2 import Points, Sim2
-from samples.world import Box, Rng, Room, disc, rectangle
+from samples.pieces import (
+    BED,
+    BIN,
+    CABINET,
+    COLUMN,
+    COUNTER,
+    LAB_BENCH,
+    LOCKER,
+    MACHINE,
+    PALLET,
+    PILASTER,
+    PILLAR,
+    PLANT,
+    RACK,
+    SHAFT,
+    SHELF,
+    SOFA,
+    Maker,
+    Piece,
+    chamfer,
+    curved_counter,
+    desk,
+    round_table,
+    stack,
+    table,
+)
+from samples.world import Box, Rng, Room, rectangle
 
 _TRIES = 25
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Piece:
-    """Something that stands on the floor: its polygons, and the size of the area it takes."""
-
-    polygons: tuple[Points, ...]
-    length_m: float
-    depth_m: float
-
-
-Maker = Callable[[Rng], Piece]
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,218 +138,100 @@ def _pose(lot: Lot, piece: Piece, inside: Box, rng: Rng) -> Sim2:
     return centre @ Sim2(along_m, float(rng.uniform(-1.0, 1.0)) * reach_deep, turn)
 
 
-# Pieces
+_CORNER_SHAFT = Lot(SHAFT, 0, 1, in_corner=True)
 
-
-def _block(length_m: tuple[float, float], depth_m: tuple[float, float]) -> Maker:
-    def make(rng: Rng) -> Piece:
-        length, depth = float(rng.uniform(*length_m)), float(rng.uniform(*depth_m))
-        return Piece((rectangle(length, depth, Sim2()),), length, depth)
-
-    return make
-
-
-def _round(radius_m: tuple[float, float]) -> Maker:
-    def make(rng: Rng) -> Piece:
-        radius = float(rng.uniform(*radius_m))
-        return Piece((disc(radius, 0.0, 0.0),), 2.0 * radius, 2.0 * radius)
-
-    return make
-
-
-def _legs(length_m: float, depth_m: float, leg_m: float) -> Iterator[Points]:
-    for x_m in (-0.5 * length_m + leg_m, 0.5 * length_m - leg_m):
-        for y_m in (-0.5 * depth_m + leg_m, 0.5 * depth_m - leg_m):
-            yield rectangle(leg_m, leg_m, Sim2(x_m, y_m))
-
-
-def _office_chair(at: Sim2) -> Iterator[Points]:
-    """Yield the column and the five castors of a swivel chair."""
-    yield disc(0.04, at.x_m, at.y_m)
-    for castor in range(5):
-        turn_rad = at.yaw_rad + castor * math.tau / 5
-        yield disc(0.035, at.x_m + 0.27 * math.cos(turn_rad), at.y_m + 0.27 * math.sin(turn_rad))
-
-
-def _chair(at: Sim2) -> Iterator[Points]:
-    """Yield the four legs of a chair."""
-    for corner in rectangle(0.4, 0.4, at):
-        yield rectangle(0.035, 0.035, Sim2(corner[0], corner[1], at.yaw_rad))
-
-
-def _desk(rng: Rng) -> Piece:
-    """Return a desk on legs with its pedestal and a swivel chair in front of it."""
-    length_m, depth_m = float(rng.uniform(1.2, 1.8)), float(rng.uniform(0.7, 0.85))
-    to_wall_m = -0.5 * 0.7
-    parts = [leg + np.array([0.0, to_wall_m]) for leg in _legs(length_m, depth_m, 0.06)]
-    if rng.uniform() < 0.75:
-        end_m = float(rng.choice([-1.0, 1.0])) * (0.5 * length_m - 0.3)
-        parts.append(rectangle(0.42, 0.55, Sim2(end_m, to_wall_m)))
-    chair = Sim2(float(rng.uniform(-0.3, 0.3)), 0.5 * depth_m + float(rng.uniform(-0.2, 0.1)), float(rng.uniform(0, 6)))
-    return Piece((*parts, *_office_chair(chair)), length_m, depth_m + 0.7)
-
-
-def _table(rng: Rng) -> Piece:
-    """Return a long table with chairs along both sides, none of them quite in its place."""
-    length_m, depth_m = float(rng.uniform(1.6, 3.6)), float(rng.uniform(0.9, 1.2))
-    parts = list(_legs(length_m, depth_m, 0.08))
-    seats = int(length_m / 0.75)
-    for seat in range(2 * seats):
-        if rng.uniform() < 0.2:
-            continue
-        side = 1.0 if seat % 2 else -1.0
-        x_m = ((seat // 2 + 0.5) / seats - 0.5) * length_m + float(rng.normal(0.0, 0.08))
-        y_m = side * (0.5 * depth_m + float(rng.uniform(0.0, 0.3)))
-        parts += _chair(Sim2(x_m, y_m, float(rng.normal(0.0, 0.25))))
-    return Piece(tuple(parts), length_m + 0.3, depth_m + 1.1)
-
-
-def _round_table(rng: Rng) -> Piece:
-    """Return a round table on one foot with a few chairs."""
-    parts = [disc(float(rng.uniform(0.2, 0.3)), 0.0, 0.0)]
-    start_rad, chairs = float(rng.uniform(0.0, 6.0)), int(rng.integers(2, 5))
-    for chair in range(chairs):
-        turn_rad = start_rad + chair * math.tau / chairs + float(rng.normal(0.0, 0.2))
-        parts += _chair(Sim2(0.75 * math.cos(turn_rad), 0.75 * math.sin(turn_rad), turn_rad))
-    return Piece(tuple(parts), 2.0, 2.0)
-
-
-def _stack(rng: Rng) -> Piece:
-    """Return a few boxes put down any way."""
-    parts: list[Points] = []
-    for _ in range(int(rng.integers(1, 4))):
-        length_m, depth_m = rng.uniform(0.25, 0.55, 2).tolist()
-        x_m, y_m = rng.uniform(-0.3, 0.3, 2).tolist()
-        parts.append(rectangle(length_m, depth_m, Sim2(x_m, y_m, float(rng.uniform(0.0, 3.0)))))
-    return Piece(tuple(parts), 1.0, 1.0)
-
-
-def _chamfer(rng: Rng) -> Piece:
-    """Return a corner cut off at an angle."""
-    length_m, depth_m = rng.uniform(0.7, 2.0, 2).tolist()
-    half = np.array([[-0.5 * length_m, -0.5 * depth_m]])
-    corners = half + np.array([[0.0, 0.0], [length_m, 0.0], [0.0, depth_m]])
-    return Piece((corners,), length_m, depth_m)
-
-
-def _curved_counter(rng: Rng) -> Piece:
-    """Return a counter bent round a corner, as at a reception."""
-    radius_m = float(rng.uniform(1.3, 2.0))
-    turn = np.linspace(0.0, math.pi / 2, 9)
-    outer = radius_m * np.stack([np.cos(turn), np.sin(turn)], axis=1) - 0.5 * radius_m
-    inner = (radius_m - 0.5) * np.stack([np.cos(turn), np.sin(turn)], axis=1) - 0.5 * radius_m
-    return Piece((np.vstack([outer, inner[::-1]]),), radius_m, radius_m)
-
-
-_SHELF = _block((0.8, 3.0), (0.32, 0.42))
-_CABINET = _block((0.6, 1.4), (0.42, 0.55))
-_LAB_BENCH = _block((1.6, 3.0), (0.7, 0.8))
-_COUNTER = _block((1.8, 3.6), (0.6, 0.65))
-_SOFA = _block((1.5, 2.2), (0.8, 0.95))
-_MACHINE = _block((0.9, 1.8), (0.8, 1.4))
-_LOCKER = _block((0.5, 2.0), (0.3, 0.45))
-_PILASTER = _block((0.35, 0.6), (0.2, 0.45))
-_SHAFT = _block((0.7, 1.7), (0.5, 1.1))
-_PILLAR = _block((0.35, 0.5), (0.35, 0.5))
-_COLUMN = _round((0.18, 0.3))
-_PLANT = _round((0.14, 0.24))
-_BIN = _round((0.12, 0.17))
-_BED = _block((1.9, 2.1), (0.9, 1.8))
-_RACK = _block((2.5, 6.0), (0.8, 1.1))
-_PALLET = _block((0.8, 1.2), (0.8, 1.2))
-_CORNER_SHAFT = Lot(_SHAFT, 0, 1, in_corner=True)
 
 FURNISHING: Mapping[str, tuple[Lot, ...]] = {
     "corridor": (
-        Lot(_PILASTER, 1, 3),
-        Lot(_LOCKER, 0, 3),
-        Lot(_BIN, 0, 2),
-        Lot(_PLANT, 0, 2),
+        Lot(PILASTER, 1, 3),
+        Lot(LOCKER, 0, 3),
+        Lot(BIN, 0, 2),
+        Lot(PLANT, 0, 2),
     ),
     "office": (
         _CORNER_SHAFT,
-        Lot(_desk, 2, 3),
-        Lot(_SHELF, 1, 2),
-        Lot(_CABINET, 0, 2),
-        Lot(_PLANT, 0, 1),
-        Lot(_BIN, 1, 1),
+        Lot(desk, 2, 3),
+        Lot(SHELF, 1, 2),
+        Lot(CABINET, 0, 2),
+        Lot(PLANT, 0, 1),
+        Lot(BIN, 1, 1),
     ),
     "open_office": (
-        Lot(_chamfer, 0, 1, in_corner=True),
-        Lot(_PILLAR, 0, 1, against_wall=False),
-        Lot(_desk, 2, 3),
-        Lot(_desk, 1, 2, against_wall=False),
-        Lot(_SHELF, 1, 2),
-        Lot(_CABINET, 0, 2),
-        Lot(_PLANT, 1, 2),
-        Lot(_BIN, 1, 2),
+        Lot(chamfer, 0, 1, in_corner=True),
+        Lot(PILLAR, 0, 1, against_wall=False),
+        Lot(desk, 2, 3),
+        Lot(desk, 1, 2, against_wall=False),
+        Lot(SHELF, 1, 2),
+        Lot(CABINET, 0, 2),
+        Lot(PLANT, 1, 2),
+        Lot(BIN, 1, 2),
     ),
     "meeting": (
-        Lot(_chamfer, 0, 1, in_corner=True),
-        Lot(_table, 1, 1, against_wall=False),
-        Lot(_CABINET, 0, 1),
-        Lot(_PLANT, 1, 2),
+        Lot(chamfer, 0, 1, in_corner=True),
+        Lot(table, 1, 1, against_wall=False),
+        Lot(CABINET, 0, 1),
+        Lot(PLANT, 1, 2),
     ),
     "lab": (
         _CORNER_SHAFT,
-        Lot(_LAB_BENCH, 1, 3),
-        Lot(_LAB_BENCH, 0, 2, against_wall=False),
-        Lot(_COLUMN, 0, 1, against_wall=False),
-        Lot(_CABINET, 1, 2),
-        Lot(_stack, 0, 1),
-        Lot(_BIN, 0, 2),
+        Lot(LAB_BENCH, 1, 3),
+        Lot(LAB_BENCH, 0, 2, against_wall=False),
+        Lot(COLUMN, 0, 1, against_wall=False),
+        Lot(CABINET, 1, 2),
+        Lot(stack, 0, 1),
+        Lot(BIN, 0, 2),
     ),
     "lounge": (
-        Lot(_curved_counter, 0, 1, in_corner=True),
-        Lot(_COLUMN, 0, 2, against_wall=False),
-        Lot(_SOFA, 1, 2),
-        Lot(_round_table, 1, 3, against_wall=False, any_turn=True),
-        Lot(_PLANT, 1, 3),
+        Lot(curved_counter, 0, 1, in_corner=True),
+        Lot(COLUMN, 0, 2, against_wall=False),
+        Lot(SOFA, 1, 2),
+        Lot(round_table, 1, 3, against_wall=False, any_turn=True),
+        Lot(PLANT, 1, 3),
     ),
     "workshop": (
-        Lot(_chamfer, 0, 1, in_corner=True),
-        Lot(_MACHINE, 1, 3, against_wall=False, any_turn=True),
-        Lot(_LAB_BENCH, 1, 2),
-        Lot(_SHELF, 1, 2),
-        Lot(_stack, 1, 3, against_wall=False, any_turn=True),
-        Lot(_PILLAR, 0, 1, against_wall=False),
+        Lot(chamfer, 0, 1, in_corner=True),
+        Lot(MACHINE, 1, 3, against_wall=False, any_turn=True),
+        Lot(LAB_BENCH, 1, 2),
+        Lot(SHELF, 1, 2),
+        Lot(stack, 1, 3, against_wall=False, any_turn=True),
+        Lot(PILLAR, 0, 1, against_wall=False),
     ),
     "kitchen": (
-        Lot(_COUNTER, 1, 2),
-        Lot(_round_table, 1, 1, against_wall=False, any_turn=True),
-        Lot(_BIN, 1, 2),
+        Lot(COUNTER, 1, 2),
+        Lot(round_table, 1, 1, against_wall=False, any_turn=True),
+        Lot(BIN, 1, 2),
     ),
     "store": (
-        Lot(_SHELF, 2, 4),
-        Lot(_stack, 1, 3, any_turn=True),
+        Lot(SHELF, 2, 4),
+        Lot(stack, 1, 3, any_turn=True),
     ),
     "copier": (
-        Lot(_MACHINE, 1, 1),
-        Lot(_SHELF, 1, 2),
-        Lot(_BIN, 1, 1),
+        Lot(MACHINE, 1, 1),
+        Lot(SHELF, 1, 2),
+        Lot(BIN, 1, 1),
     ),
     "bedroom": (
-        Lot(_BED, 1, 1),
-        Lot(_CABINET, 1, 2),
-        Lot(_BIN, 0, 1),
+        Lot(BED, 1, 1),
+        Lot(CABINET, 1, 2),
+        Lot(BIN, 0, 1),
     ),
     "living": (
-        Lot(_SOFA, 1, 2),
-        Lot(_table, 1, 1, against_wall=False),
-        Lot(_SHELF, 1, 2),
-        Lot(_round_table, 0, 1, against_wall=False, any_turn=True),
-        Lot(_PLANT, 0, 2),
+        Lot(SOFA, 1, 2),
+        Lot(table, 1, 1, against_wall=False),
+        Lot(SHELF, 1, 2),
+        Lot(round_table, 0, 1, against_wall=False, any_turn=True),
+        Lot(PLANT, 0, 2),
     ),
     "bath": (
-        Lot(_COUNTER, 1, 1),
-        Lot(_BIN, 0, 1),
+        Lot(COUNTER, 1, 1),
+        Lot(BIN, 0, 1),
     ),
     "hall": (
-        Lot(_PILLAR, 0, 1, against_wall=False),
-        Lot(_RACK, 0, 2, against_wall=False),
-        Lot(_PALLET, 1, 4, against_wall=False, any_turn=True),
-        Lot(_stack, 0, 2, against_wall=False, any_turn=True),
-        Lot(_MACHINE, 0, 1, against_wall=False, any_turn=True),
-        Lot(_COLUMN, 0, 1, against_wall=False),
+        Lot(PILLAR, 0, 1, against_wall=False),
+        Lot(RACK, 0, 2, against_wall=False),
+        Lot(PALLET, 1, 4, against_wall=False, any_turn=True),
+        Lot(stack, 0, 2, against_wall=False, any_turn=True),
+        Lot(MACHINE, 0, 1, against_wall=False, any_turn=True),
+        Lot(COLUMN, 0, 1, against_wall=False),
     ),
 }

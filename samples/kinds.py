@@ -16,6 +16,7 @@ from samples.world import Box, Door, Rng, Room
 
 Builder = Callable[[int], Site]
 
+_LEAST_CUT_M2 = 9.0
 _ROOMS_OF_A_HOME = ("living", "bedroom", "bedroom", "kitchen", "office", "store")
 
 
@@ -177,32 +178,36 @@ KINDS: Mapping[str, Builder] = {
 }
 
 
-def altered(site: Site, seed: int, share: float = 0.5) -> Site:
-    """Return the next floor: the same outline and corridors, a share of the rooms cut or united, other doors."""
+def altered(site: Site, seed: int, share: float = 0.6) -> Site:
+    """Return the next floor: same outline, corridors and doors, a share of the rooms cut in two, other furniture."""
     rng = np.random.default_rng([seed, 8])
     rooms: list[Room] = []
     for room in site.rooms:
-        box = room.box
-        if room.kind in (CORRIDOR, OPEN_PLAN) or box.area_m2 < 9.0 or rng.uniform() > share:
-            rooms.append(room)
-            continue
-        at = float(rng.uniform(0.35, 0.65))
-        if box.width_m >= box.height_m:
-            middle_m = box.x0_m + at * box.width_m
-            parts = (replace(box, x1_m=middle_m), replace(box, x0_m=middle_m))
-        else:
-            middle_m = box.y0_m + at * box.height_m
-            parts = (replace(box, y1_m=middle_m), replace(box, y0_m=middle_m))
-        rooms += [Room(room.kind, part) for part in parts]
-    kept = [room for room in rooms if room.kind == OPEN_PLAN]
-    doors = [_whole_side(low, high, rooms) for low, high in _neighbours(kept)]
-    doors += [
-        door
-        for door in choose_doors(rooms, site.style, rng)
-        if any(rooms[index].kind != OPEN_PLAN for index in door.rooms)
+        is_kept = room.kind in (CORRIDOR, OPEN_PLAN) or room.box.area_m2 < _LEAST_CUT_M2 or rng.uniform() > share
+        rooms += [room] if is_kept else _cut_in_two(room, float(rng.uniform(0.35, 0.65)))
+    index_of = {room.box: index for index, room in enumerate(rooms)}
+    kept = [
+        replace(door, rooms=(index_of[site.rooms[low].box], index_of[site.rooms[high].box]))
+        for door in site.doors
+        for low, high in [door.rooms]
+        if site.rooms[low].box in index_of and site.rooms[high].box in index_of
     ]
+    there = {door.rooms for door in kept}
+    new = [door for door in choose_doors(rooms, site.style, rng) if door.rooms not in there]
     style = replace(site.style, furniture=max(site.style.furniture, 0.7))
-    return replace(site, seed=seed, rooms=tuple(rooms), doors=tuple(doors), style=style)
+    return replace(site, seed=seed, rooms=tuple(rooms), doors=(*kept, *new), style=style)
+
+
+def _cut_in_two(room: Room, at: float) -> list[Room]:
+    """Return the rooms on both sides of a new wall across a room's longer side."""
+    box = room.box
+    if box.width_m >= box.height_m:
+        middle_m = box.x0_m + at * box.width_m
+        parts = (replace(box, x1_m=middle_m), replace(box, x0_m=middle_m))
+    else:
+        middle_m = box.y0_m + at * box.height_m
+        parts = (replace(box, y1_m=middle_m), replace(box, y0_m=middle_m))
+    return [replace(room, box=part) for part in parts]
 
 
 def _office_style(rng: Rng, width_m: tuple[float, float], height_m: tuple[float, float]) -> FloorStyle:

@@ -1,9 +1,10 @@
 """Random pairs of maps with known truth, one by one or in bulk; the same kind and seed give the same pairs.
 
 A pair is *ambiguous by construction* if a symmetry of its site's plan (the next bay of a corridor, a turn by 180°)
-explains the two maps about as well as the truth does, see `samples.likeness.explains_as_well`; two maps of near-twins
-(the next floor, the next wing) if they agree as well as maps of one place have to. This looks at the simulated maps and
-the plan alone, never at what a matcher says.
+explains the two maps about as well as the truth does, see `samples.likeness.explains_as_well`, or if any placement
+explains them in every respect as well, as of a plain room turned round, see `samples.rivals.has_rival`; two maps of
+near-twins (the next floor, the next wing) if they agree as well as maps of one place have to. This looks at the
+simulated maps, the truth and the plan alone, never at what a matcher says.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from samples.explorers import Explored, MapOf, Strip, explored
 from samples.kinds import KINDS, altered
 from samples.likeness import agreement, explains_as_well, look, shared_m2
 from samples.mess import drawn_mess, drawn_resolutions
+from samples.rivals import has_rival
 from samples.shared import Shared, shared, target_from_source
 from samples.sites import Site, reflected
 from samples.world import Rng
@@ -31,8 +33,8 @@ STRANGERS: tuple[Related, ...] = ("other building", "next floor", "next wing")
 
 LEAST_OVERLAP, MOST_OVERLAP = 0.1, 0.9
 _SNAPSHOTS = 6
-_LEAST_AREA_M2 = 18.0
-_LEAST_SHARED_M2 = 4.0
+_LEAST_AREA_M2 = 20.0
+_LEAST_SHARED_M2 = 8.0
 _TWINS_ALIKE = 0.85
 _TRIES = 8
 _NEXT_SITE = 50_000_000
@@ -152,16 +154,17 @@ def strangers(kind: str, seed: int, related: Related) -> Pair:
     kind, seed
         As of `pair`.
     related
-        What the second site is to the first: another of the same kind; the next floor, whose outline and corridors are
-        the same, and half of whose rooms are not; the next wing, which is such a floor and, as often as not, mirrored.
+        What the second site is to the first: another of the same kind; the next floor, whose outline, corridors and
+        doors are the same, but whose furniture and many of whose rooms are not; the next wing, which is such a floor
+        and, as often as not, mirrored. The robots go to the same part of both.
     """
     rng = np.random.default_rng([seed, 32, list(KINDS).index(kind)])
     first = KINDS[kind](seed)
     other = _related(kind, first, seed, related, rng)
-    strip = _anywhere(2, rng)
+    strips = _same_part(rng)
     resolutions_m = drawn_resolutions(2, rng)
     target, source = (
-        explored(site, number, strip[number], drawn_mess(rng), resolutions_m[number], 1, rng)
+        explored(site, number, strips[number], drawn_mess(rng), resolutions_m[number], 1, rng)
         for number, site in enumerate((first, other))
     )
     grids = target.maps[-1].grid, source.maps[-1].grid
@@ -181,8 +184,15 @@ def _explored(kind: str, seed: int, site: Site, strips: Sequence[Strip], maps: i
 
 def _opposite(overlap: float, direction_rad: float) -> list[Strip]:
     """Return strips from opposite sides: robots see beyond their strips, so that these need not overlap as much."""
-    reach = min(1.0, 0.5 + 0.5 * max(0.0, overlap - 0.15))
+    reach = min(1.0, 0.5 + 0.65 * max(0.0, overlap - 0.15))
     return [Strip(0.0, reach, direction_rad), Strip(1.0, 1.0 - reach, direction_rad)]
+
+
+def _same_part(rng: Rng) -> list[Strip]:
+    """Return strips of two robots that go to about the same part of a site, from opposite sides."""
+    breadth, direction_rad = float(rng.uniform(0.5, 1.0)), float(rng.uniform(0.0, math.tau))
+    lo = float(rng.uniform(0.0, 1.0 - breadth))
+    return [Strip(lo, lo + breadth, direction_rad), Strip(lo + breadth, lo, direction_rad)]
 
 
 def _anywhere(robots: int, rng: Rng) -> list[Strip]:
@@ -204,7 +214,7 @@ def _large_enough(robot: Explored) -> list[MapOf]:
 def _pair(name: str, found: Mission, robots: tuple[int, int], maps: tuple[MapOf, MapOf], truth: Shared) -> Pair:
     target, source = (found.robots[index] for index in robots)
     grids = maps[0].grid, maps[1].grid
-    ambiguous = found.site.symmetries and _is_ambiguous(found.site, target, source, grids, truth)
+    ambiguous = _is_ambiguous(found.site, target, source, grids, truth)
     return Pair(
         name,
         found.kind,
@@ -213,17 +223,17 @@ def _pair(name: str, found: Mission, robots: tuple[int, int], maps: tuple[MapOf,
         truth.centre_m,
         truth.overlap,
         truth.bend_m,
-        bool(ambiguous),
+        ambiguous,
         "same place",
     )
 
 
 def _is_ambiguous(site: Site, target: Explored, source: Explored, grids: tuple[Grid, Grid], truth: Shared) -> bool:
     looks = look(grids[0]), look(grids[1])
-    return any(
-        explains_as_well(*looks, truth.target_from_source, target_from_source(target, source, symmetry))
-        for symmetry in site.symmetries
-    )
+    moved = (target_from_source(target, source, symmetry) for symmetry in site.symmetries)
+    if any(explains_as_well(*looks, truth.target_from_source, placement) for placement in moved):
+        return True
+    return has_rival(*looks, truth.target_from_source)
 
 
 def _are_twins(grids: tuple[Grid, Grid], placement: Sim2) -> bool:

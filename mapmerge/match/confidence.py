@@ -1,12 +1,47 @@
-"""Placeholder until fitted."""
+"""The probability that a placement is right, from what speaks for and against it.
+
+An additive logistic model: each cue contributes a piecewise linear curve that only rises, or only falls, as the cue
+says more for the placement, and that is flat beyond what was seen in fitting. `mapmerge.match.calibration` holds what
+``python -m benchmarks.calibrate`` fitted; docs/method.md says on what, and how well it holds on other buildings.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import astuple, dataclass
+from itertools import pairwise
 
+from mapmerge.match.calibration import CURVES, INTERCEPT
 from mapmerge.match.cues import Cues
 
 
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """What one cue contributes.
+
+    Parameters
+    ----------
+    knots
+        Values of the cue, ascending.
+    rises
+        What is added, in full, once the cue has passed from each knot to the next.
+    """
+
+    knots: tuple[float, ...]
+    rises: tuple[float, ...]
+
+    def at(self, value: float) -> float:
+        """Return the contribution of a value."""
+        total = 0.0
+        for (low, high), rise in zip(pairwise(self.knots), self.rises, strict=True):
+            total += rise * min(1.0, max(0.0, (value - low) / (high - low)))
+        return total
+
+
+_CURVES = tuple(Curve(knots, rises) for knots, rises in CURVES.values())
+
+
 def confidence(cues: Cues) -> float:
-    """Return a placeholder."""
-    return 1.0 / (1.0 + math.exp(-20 * (cues.wall_agreement - 0.8)))
+    """Return the calibrated probability that a placement with these cues is right."""
+    log_odds = INTERCEPT + sum(curve.at(value) for curve, value in zip(_CURVES, astuple(cues), strict=True))
+    return 1.0 / (1.0 + math.exp(-log_odds))

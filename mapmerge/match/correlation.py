@@ -130,6 +130,9 @@ def _ranked(pair: PairOfMaps, seen: Look, scales: tuple[float, float], config: M
     """Return the best placement, finely aligned, and its rivals; None if there is no placement at all."""
     if len(seen.poses) == 0:
         return None
+    # of what two maps both know, most is free space, but not all
+    least_free_m2 = config.verify.min_overlap_m2 / 2
+    seen = seen.substantial_first(config.verify.min_matched_wall_m, least_free_m2)
     target, source = pair.target.map, pair.source.map
     best = polish(target, source.wall_cells_m, placement_of(seen.poses[0]), config.refine)
     if not pair.allowed(poses_of([best])).all():

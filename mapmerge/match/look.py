@@ -35,16 +35,31 @@ class Look:
         Length of the walls that agree, mean of both directions, shape (C,).
     shares
         Share of the walls that agree, in the worse of both directions, shape (C,).
+    free_m2
+        Free space that agrees, shape (C,).
     """
 
     poses: Poses
     scores_m: NDArray[np.float64]
     matched_m: NDArray[np.float64]
     shares: NDArray[np.float64]
+    free_m2: NDArray[np.float64]
 
     def rows(self, chosen: Sequence[int] | slice) -> Look:
         """Return some of the placements."""
-        return Look(self.poses[chosen], self.scores_m[chosen], self.matched_m[chosen], self.shares[chosen])
+        parts = (self.poses, self.scores_m, self.matched_m, self.shares, self.free_m2)
+        return Look(*(part[chosen] for part in parts))
+
+    def substantial_first(self, least_wall_m: float, least_free_m2: float) -> Look:
+        """Return the placements with the best of those first that have so much wall and free space in common, if any.
+
+        A placement with hardly any overlap has hardly anything against it; it says nothing of why maps do not fit.
+        """
+        found = np.flatnonzero((self.matched_m >= least_wall_m) & (self.free_m2 >= least_free_m2))
+        if len(found) == 0:
+            return self
+        order = [int(found[0]), *(row for row in range(len(self.poses)) if row != found[0])]
+        return self.rows(order)
 
     def joined(self, other: Look) -> Look:
         """Return the placements of both, best first."""
@@ -53,6 +68,7 @@ class Look:
             np.concatenate([self.scores_m, other.scores_m]),
             np.concatenate([self.matched_m, other.matched_m]),
             np.concatenate([self.shares, other.shares]),
+            np.concatenate([self.free_m2, other.free_m2]),
         )
         return both.rows(np.argsort(-both.scores_m, kind="stable").tolist())
 
@@ -108,7 +124,7 @@ def scored(pair: PairOfMaps, poses: Poses, config: MergeConfig) -> Look:
     found = agreement(target, source, poses, probe(source, most, most // 2), probe(target, most, most // 2))
     matched_m = (found.ahead.matched_m + found.back.matched_m) / 2
     shares = np.minimum(found.ahead.share, found.back.share)
-    judged = Look(poses, found.score_m(config.verify), matched_m, shares)
+    judged = Look(poses, found.score_m(config.verify), matched_m, shares, found.free_m2)
     return judged.rows(np.argsort(-judged.scores_m, kind="stable").tolist())
 
 

@@ -122,3 +122,34 @@ class TestLoops:
     def test_a_robot_of_many_is_placed_by_its_strongest_match(self):
         forest = placed("abcd", edge("a", "b", 9.0), edge("a", "c", 9.0), edge("b", "d", 2.0), edge("c", "d", 3.0))
         assert forest.placements["d"].via == "c"
+
+
+class TestVotes:
+    """Several loops say which match is the wrong one, however strong it is."""
+
+    WRONG = Sim2(9.0, 0.0)
+
+    def test_a_strong_wrong_match_is_outvoted(self):
+        wrong = edge("a", "b", 5.0, self.WRONG)
+        right = [edge(*pair, 3.0) for pair in ("ac", "bc", "ad", "bd")]
+        forest = placed("abcd", wrong, *right)
+        assert forest.contradicted == (wrong,)
+        for robot in "abcd":
+            assert_close(forest.placements[robot].component_from_map, TRUE[robot])
+
+    def test_two_strong_wrong_matches_of_one_robot_are_outvoted(self):
+        wrong = [edge("a", "b", 5.0, self.WRONG), edge("a", "c", 4.5, Sim2(0.0, -7.0))]
+        right = [edge(*pair, 3.0) for pair in ("ad", "ae", "bd", "be", "cd", "ce", "de")]
+        forest = placed(ROBOTS, *wrong, *right)
+        assert set(forest.contradicted) == set(wrong)
+
+    def test_votes_never_cut_a_robot_off(self):
+        only = edge("a", "b", 1.0)
+        forest = placed("abcd", only, edge("b", "c", 2.0), edge("c", "d", 2.0), edge("b", "d", 2.0, self.WRONG))
+        assert {placement.component for placement in forest.placements.values()} == {"a"}
+
+    @pytest.mark.parametrize("order", list(itertools.permutations(range(5)))[::17])
+    def test_the_order_of_matches_changes_no_vote(self, order):
+        edges = [edge("a", "b", 5.0, self.WRONG), *(edge(*pair, 3.0) for pair in ("ac", "bc", "ad", "bd"))]
+        forest = placed("abcd", *(edges[index] for index in order))
+        assert forest.contradicted == (edges[0],)

@@ -6,13 +6,15 @@ import math
 import numpy as np
 import pytest
 
-from mapmerge.sim2 import Sim2
+from mapmerge.sim2 import IDENTITY, Sim2
 from samples.kinds import KINDS, altered
 from samples.likeness import agreement, explains_as_well, look, shared_m2
 from samples.mission import known_at
 from samples.pairs import STRANGERS, mission, pair, pairs, strangers
+from samples.rivals import has_rival
 from samples.sites import Bend, Changes, bent, reflected, visited
 from samples.slam import Warp, drawn_warp
+from tests.floors import drawn, outline, within
 
 cached_pair = functools.cache(pair)
 NO_CHANGES = Changes()
@@ -76,10 +78,10 @@ def test_pairs_repeat_themselves():
     assert not one.target.same_as(other.target)
 
 
-@pytest.mark.parametrize("overlap", [0.3, 0.8])
-def test_the_overlap_comes_close_to_what_is_wanted(overlap):
-    found = [pair("home", seed, overlap).overlap for seed in (1, 2)]
-    assert np.mean(found) == pytest.approx(overlap, abs=0.12)
+def test_the_overlap_follows_what_is_wanted():
+    found = [pair("symmetric", 1, overlap).overlap for overlap in (0.2, 0.5, 0.8)]
+    np.testing.assert_allclose(found, [0.2, 0.5, 0.8], atol=0.15)
+    assert found == sorted(found)
 
 
 @pytest.mark.parametrize("related", STRANGERS)
@@ -91,8 +93,8 @@ def test_strangers_have_no_truth(related):
 
 
 def test_one_mission_yields_many_pairs():
-    found = list(pairs(mission("symmetric", 2, robots=3, maps=3)))
-    assert len(found) > 5
+    found = list(pairs(mission("symmetric", 2, robots=3, maps=2)))
+    assert len(found) > 3
     assert len({item.name for item in found}) == len(found)
     for item in found:
         assert 0.05 <= item.overlap <= 1.0
@@ -106,6 +108,14 @@ class TestAmbiguous:
 
     def test_an_office_is_not(self):
         assert not cached_pair("office", 3).ambiguous
+
+    def test_a_plain_room_is(self):
+        room = {"walls": outline(0.0, 0.0, 6.0, 4.0), "size_m": (7.0, 5.0), "floor_from_map": Sim2(-0.5, -0.5)}
+        plain = [look(drawn(within(0.0, 0.0, 6.0, 4.0), ragged=seed, **room)) for seed in (1, 2)]
+        assert has_rival(*plain, IDENTITY)
+        room["walls"] = [*room["walls"], (1.0, 0.0, 1.1, 2.5), (1.0, 2.5, 2.5, 2.6)]
+        told_apart = [look(drawn(within(0.0, 0.0, 6.0, 4.0), ragged=seed, **room)) for seed in (1, 2)]
+        assert not has_rival(*told_apart, IDENTITY)
 
     def test_the_truth_explains_itself(self):
         found = cached_pair("symmetric", 3)

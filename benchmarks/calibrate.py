@@ -1,0 +1,175 @@
+"""Fits the default method's confidence to observations: ``python -m benchmarks.calibrate OBSERVATIONS.jsonl``.
+
+The observations come from `benchmarks.collect`. What is held out of the fit is what the result is stated on: the share
+of accepted placements that are wrong, with its 95 % bound, and a reliability diagram. With ``--write`` the fitted
+curves replace those of `mapmerge.match.calibration`.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.observations import Observation, groups, read
+from benchmarks.reliability import binned, diagram, wilson
+from mapmerge.config import MergeConfig
+from mapmerge.match import calibration
+from mapmerge.match.cues import Cues
+
+Array = NDArray[np.float64]
+
+AGAINST = {"far_share", "likeness", "rival_agreement"}
+"""Cues that speak against a placement; all others speak for it."""
+_QUANTILES = (0.02, 0.15, 0.35, 0.6, 0.85, 0.98)
+_PENALTY = 2e-5
+_STEPS = 6000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Model:
+    """An additive logistic model with monotone curves.
+
+    Parameters
+    ----------
+    knots
+        Of each cue.
+    rises
+        Of each cue, between its knots.
+    intercept
+        Log odds where all cues are at or below their first knot.
+    """
+
+    knots: tuple[Array, ...]
+    rises: tuple[Array, ...]
+    intercept: float
+
+    def confidence(self, cues: Array) -> Array:
+        """Return the probability of each row of cues, shape (N, number of cues)."""
+        log_odds = self.intercept + _ramps(cues, self.knots) @ np.concatenate(self.rises)
+        return np.asarray(1.0 / (1.0 + np.exp(-log_odds)), np.float64)
+
+
+def fitted(cues: Array, right: NDArray[np.bool_], weights: Array) -> Model:
+    """Return the model of largest likelihood, with a small penalty on what it adds, found by projected descent."""
+    knots = tuple(_knots(cues[:, column]) for column in range(cues.shape[1]))
+    ramps = _ramps(cues, knots)
+    signs = np.concatenate(
+        [
+            np.full(len(item) - 1, -1.0 if cue.name in AGAINST else 1.0)
+            for cue, item in zip(fields(Cues), knots, strict=True)
+        ]
+    )
+    columns = np.hstack([ramps * signs, np.ones((len(ramps), 1))])
+    weights = weights / weights.sum()
+    step = 4.0 / float(np.linalg.norm(columns * np.sqrt(weights)[:, None], 2) ** 2 + 4 * _PENALTY)
+    point, ahead, momentum = np.zeros(columns.shape[1]), np.zeros(columns.shape[1]), 1.0
+    for _ in range(_STEPS):
+        gap = weights * (1.0 / (1.0 + np.exp(-columns @ ahead)) - right)
+        slope = columns.T @ gap
+        slope[:-1] += 2 * _PENALTY * ahead[:-1]
+        after = ahead - step * slope
+        after[:-1] = np.maximum(after[:-1], 0.0)
+        grown = (1.0 + np.sqrt(1.0 + 4.0 * momentum**2)) / 2.0
+        ahead = after + (momentum - 1.0) / grown * (after - point)
+        point, momentum = after, grown
+    splits = np.cumsum([len(item) - 1 for item in knots])[:-1]
+    return Model(knots, tuple(np.split(point[:-1] * signs, splits)), float(point[-1]))
+
+
+def cue_array(found: Sequence[Observation]) -> Array:
+    """Return the cues of observations, shape (N, number of cues)."""
+    return np.array([astuple(item.cues) for item in found], np.float64).reshape(len(found), len(fields(Cues)))
+
+
+def balanced(found: Sequence[Observation]) -> Array:
+    """Return weights by which recorded maps count as much as all simulated ones of one kind."""
+    sizes = {name: len(items) for name, items in groups(found).items()}
+    return np.array([1.0 / sizes[item.group] for item in found])
+
+
+def _knots(values: Array) -> Array:
+    knots = np.unique(np.quantile(values, _QUANTILES).round(4))
+    return knots if len(knots) > 1 else np.array([knots[0], knots[0] + 1.0])
+
+
+def _ramps(cues: Array, knots: Sequence[Array]) -> Array:
+    parts = [
+        np.clip((cues[:, column, None] - item[:-1]) / np.diff(item), 0.0, 1.0) for column, item in enumerate(knots)
+    ]
+    return np.hstack(parts)
+
+
+def source_of(model: Model) -> str:
+    """Return the text of `mapmerge.match.calibration`."""
+    lines = ['"""What `mapmerge.match.confidence` is made of; written by ``python -m benchmarks.calibrate``."""', ""]
+    lines += ["from __future__ import annotations", "", f"INTERCEPT = {model.intercept:.4f}", ""]
+    lines += ["CURVES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {"]
+    for cue, knots, rises in zip(fields(Cues), model.knots, model.rises, strict=True):
+        at, up = (", ".join(f"{value:.4f}" for value in values) for values in (knots, rises))
+        comma = "," if len(rises) == 1 else ""
+        lines.append(f'    "{cue.name}": (({at}), ({up}{comma})),')
+    return "\n".join(
+        [*lines, "}", '"""Knots of each cue, and what is added to the log odds from each to the next."""', ""]
+    )
+
+
+def statement(found: Sequence[Observation], stated: Array, least: float) -> list[str]:
+    """Return what can be said of the placements that a confidence accepts."""
+    lines = [f"accepted at {least:g} or more:"]
+    everything = {**groups(found), "all": list(found)}
+    for name, items in everything.items():
+        chosen = np.array([name in (item.group, "all") for item in found])
+        accepted = chosen & (stated >= least)
+        right = np.array([item.right for item in found])
+        wrong = int((accepted & ~right).sum())
+        bound = 1.0 - wilson(int((accepted & right).sum()), int(accepted.sum()))[0]
+        shares = " ".join(
+            f"{lo:g}–{hi:g}: {_share(items, chosen, accepted & right, found, lo, hi)}"
+            for lo, hi in ((0.1, 0.3), (0.3, 0.5), (0.5, 1.01))
+        )
+        lines.append(
+            f"  {name:<10} {int(accepted.sum()):>5} accepted, {wrong:>3} wrong (95 % bound {bound:.4f}); "
+            f"placed rightly by overlap {shares}"
+        )
+    return lines
+
+
+def _share(
+    items: Sequence[Observation],
+    chosen: NDArray[np.bool_],
+    good: NDArray[np.bool_],
+    found: Sequence[Observation],
+    lo: float,
+    hi: float,
+) -> str:
+    there = chosen & np.array([item.related and lo <= item.overlap < hi for item in found])
+    return f"{int((there & good).sum())}/{int(there.sum())}" if items else "–"
+
+
+def main() -> None:
+    """Fit, and say how well it holds."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else None)
+    parser.add_argument("observations", type=Path)
+    parser.add_argument("--write", action="store_true", help="replace mapmerge/match/calibration.py")
+    options = parser.parse_args()
+    clear = [item for item in read(options.observations) if not item.ambiguous]
+    fit = [item for item in clear if not item.held_out]
+    held_out = [item for item in clear if item.held_out]
+    model = fitted(cue_array(fit), np.array([item.right for item in fit]), balanced(fit))
+    least = MergeConfig().verify.min_confidence
+    for title, items in (("fitted on", fit), ("held out", held_out)):
+        stated = model.confidence(cue_array(items))
+        print(f"\n{title}: {len(items)} pairs, {sum(item.right for item in items)} of them found rightly")
+        print("\n".join(statement(items, stated, least)))
+        print("\n".join(diagram(binned(zip(stated.tolist(), (item.right for item in items), strict=True)))))
+    if options.write:
+        Path(str(calibration.__file__)).write_text(source_of(model), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
