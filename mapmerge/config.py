@@ -108,6 +108,11 @@ class SearchConfig(Settings):
     clear_likeness: float = 0.5
     working_cell_m: float = 0.05
 
+    def __post_init__(self) -> None:
+        super(SearchConfig, self).__post_init__()
+        if not self.scale_step > 1.0:
+            raise ConfigError(f"scale_step is {self.scale_step}; expected more than 1")
+
 
 @dataclass(frozen=True, slots=True)
 class RefineConfig(Settings):
@@ -250,3 +255,9 @@ class MergeConfig(Settings):
     existing: ExistingConfig = field(default_factory=ExistingConfig)
     moved_m: float = 0.10
     moved_rad: float = math.radians(0.5)
+
+    def __post_init__(self) -> None:
+        super(MergeConfig, self).__post_init__()
+        least, largest = self.scale_range
+        if not least <= 1.0 <= largest:
+            raise ConfigError(f"scale_range is {self.scale_range}; expected a factor up to 1, and one from 1")

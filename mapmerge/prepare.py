@@ -48,8 +48,8 @@ class NearestWalls:
         """Return the row of the nearest wall for places of any shape; beyond the padding, that of its border."""
         rows, cols = self.index.shape
         inverse, margin = np.float32(1.0 / self.cell_m), np.float32(self.margin)
-        col = np.clip((x_m * inverse + margin).astype(np.int32), 0, cols - 1)
-        row = np.clip((y_m * inverse + margin).astype(np.int32), 0, rows - 1)
+        col = np.clip(x_m * inverse + margin, 0, cols - 1).astype(np.int32)
+        row = np.clip(y_m * inverse + margin, 0, rows - 1).astype(np.int32)
         found: NDArray[np.int32] = self.index.ravel()[row * cols + col]
         return found
 

@@ -122,8 +122,8 @@ def _met(prepared: PreparedMap, poses: Poses, points_m: Points) -> NDArray[np.ui
 def _looked_up(prepared: PreparedMap, x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.uint8]:
     rows, cols = prepared.meets.shape
     inverse, margin = np.float32(1.0 / prepared.resolution_m), np.float32(prepared.margin)
-    col = np.clip((x * inverse + margin).astype(np.int32), 0, cols - 1)
-    row = np.clip((y * inverse + margin).astype(np.int32), 0, rows - 1)
+    col = np.clip(x * inverse + margin, 0, cols - 1).astype(np.int32)
+    row = np.clip(y * inverse + margin, 0, rows - 1).astype(np.int32)
     found: NDArray[np.uint8] = prepared.meets.ravel()[row * cols + col]
     return found
 

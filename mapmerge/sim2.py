@@ -85,11 +85,15 @@ class Sim2:
         return matrix
 
     def is_close(self, other: Sim2, *, distance_m: float, angle_rad: float, at_m: tuple[float, float]) -> bool:
-        """Tell whether both transforms take the source point ``at_m`` to about the same pose."""
+        """Tell whether both transforms take the source point ``at_m`` to about the same pose.
+
+        Scales may differ by as much as angles: what either does to a point is alike.
+        """
         x_m, y_m = self.apply_point(*at_m)
         other_x_m, other_y_m = other.apply_point(*at_m)
         near = math.hypot(x_m - other_x_m, y_m - other_y_m) <= distance_m
-        return near and abs(wrap_angle(self.yaw_rad - other.yaw_rad)) <= angle_rad
+        alike = abs(math.log(self.scale / other.scale)) <= angle_rad
+        return near and alike and abs(wrap_angle(self.yaw_rad - other.yaw_rad)) <= angle_rad
 
 
 IDENTITY = Sim2()

@@ -12,7 +12,10 @@ import numpy as np
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.match import Match, Matcher
+from mapmerge.match.correlation import CorrelationMatcher
+from mapmerge.match.pair import DescribedMap, PairOfMaps
 from mapmerge.prepare import PreparedMap, prepare
+from mapmerge.prior import Prior
 from mapmerge.sim2 import IDENTITY, Sim2, wrap_angle
 from samples.drive import Pace, follow, route, stops, survey, tour, window
 from samples.floorplan import FloorStyle, look_alike_corridor, office_floor
@@ -192,6 +195,85 @@ def flat(
     )
 
 
+LINE_M = np.stack([np.linspace(0.0, 10.0, 101), np.full(101, 2.0)], axis=1)
+FEW_POINTS = {
+    "no points": np.empty((0, 2)),
+    "one point": np.array([[1.0, 2.0]]),
+    "one point, often": np.tile([[1.0, 2.0]], (40, 1)),
+    "two points": np.array([[1.0, 2.0], [1.5, 2.0]]),
+    "a line": LINE_M,
+    "an oblique line": Sim2(yaw_rad=0.7).apply(LINE_M),
+}
+
+
+def walls_of_the_flat(seed: int, yaw_rad: float = 0.0, share: float = 1.0) -> np.ndarray:
+    """Return noisy points on the flat's walls, turned about the origin; of a part of the flat if ``share`` < 1."""
+    rng = np.random.default_rng(seed)
+    points = []
+    for x0_m, y0_m, x1_m, y1_m in FLAT_WALLS:
+        count = int(20 * ((x1_m - x0_m) + (y1_m - y0_m)))
+        points.append(rng.uniform((x0_m, y0_m), (x1_m, y1_m), (count, 2)))
+    walls_m = np.vstack(points) + rng.normal(0.0, 0.02, (sum(map(len, points)), 2))
+    return Sim2(yaw_rad=yaw_rad).apply(walls_m[walls_m[:, 0] <= share * FLAT_M[0]])
+
+
+HALL_WALLS = [
+    *outline(0.0, 0.0, 60.0, 40.0),
+    (10.0, 0.0, 10.1, 9.0),
+    (4.0, 6.0, 7.0, 6.1),
+    (45.0, 30.0, 45.1, 40.0),
+    (45.0, 30.0, 52.0, 30.1),
+    (50.0, 34.0, 50.6, 36.0),
+    (3.0, 31.0, 12.0, 31.1),
+    (8.0, 33.0, 8.1, 40.0),
+    (48.0, 0.0, 48.1, 8.0),
+    (52.0, 5.0, 60.0, 5.1),
+    (25.0, 17.0, 34.0, 17.1),
+    (31.0, 17.0, 31.1, 25.0),
+]
+
+
+def hall_and_part(corner_m: tuple[float, float], yaw_rad: float) -> tuple[Grid, Grid, Sim2]:
+    """Return a hall of 60 × 40 m, a part of 13 × 11 m of it mapped in another frame, and where that lies in the hall."""
+    x_m, y_m = corner_m
+    hall_from_part = Sim2(x_m + 6.5, y_m + 5.5, yaw_rad) @ Sim2(-9.0, -9.0)
+    hall = drawn(within(0.0, 0.0, 60.0, 40.0), HALL_WALLS, size_m=(61.0, 41.0), floor_from_map=Sim2(-0.5, -0.5))
+    known = within(x_m, y_m, x_m + 13.0, y_m + 11.0)
+    part = drawn(known, HALL_WALLS, size_m=(18.0, 18.0), floor_from_map=hall_from_part)
+    known_m = hall_from_part.apply(part.centres_m(np.ones(part.cells.shape, np.bool_))).T
+    cells = np.where(known(*known_m).reshape(part.cells.shape), part.cells, UNKNOWN).astype(np.int8)
+    return hall, Grid(cells, part.resolution_m), Sim2(-0.5, -0.5).inverse() @ hall_from_part
+
+
+def with_another_label(grid: Grid, factor: float) -> Grid:
+    """Return the same cells, whose side is said to be so many times what it is; the origin is scaled as well."""
+    pose = grid.map_from_grid
+    return Grid(grid.cells, grid.resolution_m * factor, Sim2(pose.x_m * factor, pose.y_m * factor, pose.yaw_rad))
+
+
+def described(grid: Grid, config: MergeConfig = CONFIG) -> DescribedMap:
+    return CorrelationMatcher().prepare(grid, max(config.search.working_cell_m, grid.resolution_m), config)
+
+
+def pair_of_maps(target: Grid, source: Grid, prior: Prior | None = None) -> PairOfMaps:
+    return PairOfMaps(described(target), described(source), prior)
+
+
+def walled_room(
+    size_m: tuple[float, float], *, open_ends: bool, ragged: int | None = None, yaw_rad: float = 0.0
+) -> Grid:
+    """Return a room; without its short walls if its ends are open. Its map frame is the room's, whatever the turn."""
+    width_m, height_m = size_m
+    walls = outline(0.0, 0.0, *size_m)
+    side_m = math.hypot(*size_m) + 2.0
+    corner = Sim2(width_m / 2, height_m / 2, yaw_rad) @ Sim2(-side_m / 2, -side_m / 2)
+    known = within(0.0, -0.2, width_m, height_m + 0.2) if open_ends else within(-0.2, -0.2, width_m + 0.2, height_m + 0.2)
+    grid = drawn(known, walls, size_m=(side_m, side_m), floor_from_map=corner, ragged=ragged)
+    centres_m = corner.apply(grid.centres_m(np.ones(grid.cells.shape, np.bool_))).T
+    cells = np.where(known(*centres_m).reshape(grid.cells.shape), grid.cells, UNKNOWN).astype(np.int8)
+    return Grid(cells, grid.resolution_m, corner)
+
+
 def filled(value: int, rows: int, cols: int, resolution_m: float = 0.05) -> Grid:
     return Grid(np.full((rows, cols), value, np.int8), resolution_m)
 
@@ -207,11 +289,13 @@ def errors(found: Sim2, true: Sim2, at_m: tuple[float, float]) -> tuple[float, f
     return math.hypot(x_m - true_x_m, y_m - true_y_m), abs(math.degrees(turn_rad))
 
 
-def match_grids(matcher: Matcher, target: Grid, source: Grid, config: MergeConfig = CONFIG) -> Match:
+def match_grids(
+    matcher: Matcher, target: Grid, source: Grid, config: MergeConfig = CONFIG, prior: Prior | None = None
+) -> Match:
     """Match two maps at the resolution that the merger would take."""
     resolution_m = max(config.search.working_cell_m, target.resolution_m, source.resolution_m)
     prepared = [matcher.prepare(grid, resolution_m, config) for grid in (target, source)]
-    return matcher.match(*prepared, config)
+    return matcher.match(*prepared, config, prior)
 
 
 def prepared_map(grid: Grid, config: MergeConfig = CONFIG) -> PreparedMap:

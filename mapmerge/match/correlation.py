@@ -71,9 +71,9 @@ class CorrelationMatcher:
         pair = PairOfMaps(first, second, prior, swapped)
         match = _matched(pair, config)
         if prior is not None and not match.accepted:
-            elsewhere = _matched(PairOfMaps(first, second), config)
+            elsewhere = _matched(PairOfMaps(first, second, swapped=swapped), config)
             if elsewhere.accepted:
-                match = contradicted(match, elsewhere, prior, pair)
+                match = contradicted(match, elsewhere, prior, pair, config.verify)
         return _inverted(match) if swapped else match
 
 
@@ -108,10 +108,16 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
 
 def _search(pair: PairOfMaps, rotations: tuple[float, ...], config: MergeConfig) -> _Found | None:
     """Return the best placement and its rivals, after a second look if the first one is not clear."""
-    scales = config.scale_range if config.scale == "free" else (1.0, 1.0)
-    steps = all_scales(*scales, config.search.scale_step) if config.scale == "free" else (1.0,)
+    scales, steps = (1.0, 1.0), (1.0,)
+    if config.scale == "free":
+        least, largest = config.scale_range
+        scales = (1 / largest, 1 / least) if pair.swapped else (least, largest)
+        steps = all_scales(*scales, config.search.scale_step)
     if pair.prior is not None:
-        return _ranked(pair, look(pair, by_prior(pair, config.search), scales, config), scales, config)
+        starts = by_prior(pair, config.search)
+        if len(steps) > 1:
+            starts = np.vstack([starts, by_spectra(pair, rotations, steps, config.search)])
+        return _ranked(pair, look(pair, starts, scales, config), scales, config)
     seen = look(pair, by_spectra(pair, rotations, steps, config.search), scales, config)
     found = _ranked(pair, seen, scales, config)
     if found is not None and _is_clear(found, config):
@@ -206,9 +212,9 @@ def _surface(pair: PairOfMaps, found: _Found, config: MergeConfig) -> Evidence:
     return SurfaceEvidence(
         step="correlation_surface",
         title=f"Correlation of walls and free space, one map turned by {math.degrees(turn.yaw_rad):.1f}°",
-        values=surface.centred(),
-        marks=tuple(surface.centred_index(placement_of(pose)) for pose in found.rivals.poses[same_turn]),
-        chosen=surface.centred_index(found.best),
+        values=surface.values,
+        marks=tuple(surface.index(placement_of(pose)) for pose in found.rivals.poses[same_turn]),
+        chosen=surface.index(found.best),
     )
 
 

@@ -29,11 +29,16 @@ class DescribedMap:
     def comes_before(self, other: DescribedMap) -> bool:
         """Tell which of two maps is the source whatever order they are given in, so that the outcome is symmetric.
 
-        It is the smaller one, which costs less.
+        It is the smaller one, which costs less. Of copies, the frames decide.
         """
         mine, others = self.map.grid, other.map.grid
         key, other_key = (mine.known_area_m2, *mine.cells.shape), (others.known_area_m2, *others.cells.shape)
-        return key < other_key or (key == other_key and mine.cells.tobytes() < others.cells.tobytes())
+        if key != other_key:
+            return key < other_key
+        if not np.array_equal(mine.cells, others.cells):
+            return mine.cells.tobytes() < others.cells.tobytes()
+        one, two = mine.map_from_grid, others.map_from_grid
+        return (one.x_m, one.y_m, one.yaw_rad) < (two.x_m, two.y_m, two.yaw_rad)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +52,8 @@ class PairOfMaps:
     prior
         What is believed of their placement; None if nothing is.
     swapped
-        Whether the prior is of the source from the target.
+        Whether these are not the maps as they were given, but the other way round: the prior is of the source from
+        the target, and so are limits of the scale.
     """
 
     target: DescribedMap

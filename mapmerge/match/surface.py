@@ -26,38 +26,26 @@ class CorrelationSurface:
     turn
         The rotation, and the scale.
     values
-        Shape (rows, columns): score in metres of wall; a row or column is one step of the shift in y or x. Shifts are
-        cyclic: the last ones are negative.
-    negative
-        How many of the last rows, and columns, are of negative shifts.
+        Shape (rows, columns): score in metres of wall; a row or column is one step of the shift in y or x.
     origin_m
-        The shift of the first value.
+        The shift of the first value, the lowest.
     step_m
         Shift between two values.
     """
 
     turn: Sim2
     values: Surface
-    negative: int
     origin_m: tuple[float, float]
     step_m: float
 
     def shift_m(self, rows: Indices, cols: Indices) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the shifts in x and y of some values."""
-        height, width = self.values.shape
-        x = np.where(cols < width - self.negative, cols, cols - width) * self.step_m
-        y = np.where(rows < height - self.negative, rows, rows - height) * self.step_m
-        return x + self.origin_m[0], y + self.origin_m[1]
+        return cols * self.step_m + self.origin_m[0], rows * self.step_m + self.origin_m[1]
 
-    def centred(self) -> Surface:
-        """Return the values with the most negative shifts first."""
-        return np.roll(self.values, (self.negative, self.negative), axis=(0, 1))
-
-    def centred_index(self, target_from_source: Sim2) -> tuple[int, int]:
-        """Return row and column in `centred` of the shift that is nearest to that of a placement."""
+    def index(self, target_from_source: Sim2) -> tuple[int, int]:
+        """Return row and column of the shift that is nearest to that of a placement."""
         row = round((target_from_source.y_m - self.origin_m[1]) / self.step_m)
-        col = round((target_from_source.x_m - self.origin_m[0]) / self.step_m)
-        return row + self.negative, col + self.negative
+        return row, round((target_from_source.x_m - self.origin_m[0]) / self.step_m)
 
 
 class TranslationSearch:
@@ -95,6 +83,10 @@ class TranslationSearch:
         self._cell_m = max(cell_m, target.resolution_m, max(sides_m) / max_side_cells)
         cols, rows = (math.ceil(side_m / self._cell_m) + 4 for side_m in sides_m)
         self._shape = (cv2.getOptimalDFTSize(rows), cv2.getOptimalDFTSize(cols))
+        # shifts are cyclic: no source meets the target further up than at its last cell, so that what lies beyond is
+        # below the first one
+        highest = [math.ceil(side_m / self._cell_m) + 1 for side_m in reversed(target.extent_m)]
+        self._below = (self._shape[0] - highest[0], self._shape[1] - highest[1])
         walls, free = self._rasters(target.walls_m, target.free_m)
         walls_spectrum, free_spectrum = cv2.dft(cv2.GaussianBlur(walls, (3, 3), 0.0)), cv2.dft(free)
         # what the source's walls meet, and what its free space meets
@@ -115,15 +107,21 @@ class TranslationSearch:
         walls, free = (np.asarray(cv2.dft(raster * length_m), np.float32) for raster in rasters)
         low_x_m, low_y_m = low.tolist()
         half = Sim2(0.0, 0.0, turn.yaw_rad + math.pi, turn.scale)
-        reach = min(min(self._shape) - 1, math.ceil(self._reach_m / self._cell_m) + 2)
+        cell_m, (below_y, below_x) = self._cell_m, self._below
+        first_m = (-low_x_m - below_x * cell_m, -low_y_m - below_y * cell_m)
         ahead = [
-            CorrelationSurface(turn, _correlated(spectra, walls, free, True), reach, (-low_x_m, -low_y_m), self._cell_m)
+            CorrelationSurface(
+                turn,
+                np.roll(_correlated(spectra, walls, free, True), self._below, axis=(0, 1)),
+                first_m,
+                cell_m,
+            )
             for spectra in self._spectra
         ]
-        # turned by 180°, cell k becomes cell −k, whose far corner is the near one of before: no shift is negative
-        corner = (low_x_m + self._cell_m, low_y_m + self._cell_m)
+        # turned by 180°, cell k becomes cell −k, whose far corner is the near one of before: no shift is below the first
+        corner_m = (low_x_m + cell_m, low_y_m + cell_m)
         back = [
-            CorrelationSurface(half, _correlated(spectra, walls, free, False), 0, corner, self._cell_m)
+            CorrelationSurface(half, _correlated(spectra, walls, free, False), corner_m, cell_m)
             for spectra in self._spectra
         ]
         return (*ahead, *back)

@@ -11,12 +11,14 @@ from mapmerge.match.cues import Cues
 from mapmerge.match.pair import DescribedMap, PairOfMaps
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
-from mapmerge.verify import Scores
+from mapmerge.verify import Scores, verify
 
 
 def too_little_structure(target: DescribedMap, source: DescribedMap, config: VerifyConfig) -> Reason | None:
-    """Return a refusal if one of the maps has fewer walls than a placement must match."""
+    """Return a refusal if one of the maps has fewer walls than a placement must match, or none at all."""
     least_m = min(target.wall_m, source.wall_m)
+    if least_m <= 0.0:
+        return Reason(ReasonCode.TOO_LITTLE_STRUCTURE, "one of the maps shows no wall at all")
     if least_m >= config.min_matched_wall_m:
         return None
     message = f"one of the maps shows {_down(least_m, 1):.1f} m of wall, less than {config.min_matched_wall_m:g} m"
@@ -52,11 +54,12 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig) -
     return Reason(ReasonCode.LOW_CONFIDENCE, message)
 
 
-def contradicted(match: Match, elsewhere: Match, prior: Prior, pair: PairOfMaps) -> Match:
+def contradicted(match: Match, elsewhere: Match, prior: Prior, pair: PairOfMaps, config: VerifyConfig) -> Match:
     """Return the refusal of a prior that the maps contradict: both placements are shown."""
-    if match.target_from_source is None:
-        believed = prior.target_from_source
-        match = replace(match, target_from_source=believed.inverse() if pair.swapped else believed)
+    believed = pair.believed
+    if match.target_from_source is None and believed is not None:
+        scores = verify(pair.target.map, pair.source.map, believed, config)
+        match = replace(match, target_from_source=pair.between_maps(believed), scores=scores)
     if elsewhere.target_from_source is None or elsewhere.scores is None:
         return match
     true = elsewhere.target_from_source.inverse() if pair.swapped else elsewhere.target_from_source

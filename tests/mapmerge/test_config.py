@@ -21,9 +21,9 @@ class TestNumbers:
         [
             (CellConfig, "p_free"),
             (SearchConfig, "cell_m"),
-            (SearchConfig, "free_weight"),
+            (SearchConfig, "clear_likeness"),
             (RefineConfig, "iterations"),
-            (VerifyConfig, "min_margin"),
+            (VerifyConfig, "violation_weight"),
             (MergeConfig, "moved_rad"),
         ],
     )
@@ -31,7 +31,7 @@ class TestNumbers:
         with pytest.raises(ConfigError, match=name):
             settings(**{name: value})
 
-    @pytest.mark.parametrize("name", ["wall_spacing_m", "angle_step_rad", "cell_m"])
+    @pytest.mark.parametrize("name", ["wall_spacing_m", "angle_step_rad", "cell_m", "sweep_cell_m"])
     def test_what_is_divided_by_must_be_positive(self, name):
         with pytest.raises(ConfigError, match=name):
             SearchConfig(**{name: 0})
@@ -47,8 +47,26 @@ class TestNumbers:
             VerifyConfig(min_confidence=value)
 
     def test_zero_is_a_fine_threshold(self):
-        assert VerifyConfig(min_overlap_m2=0.0, min_matched_wall_m=0, min_margin=0.0).min_margin == 0.0
-        assert SearchConfig(free_weight=0.0, working_cell_m=0.0).free_weight == 0.0
+        assert VerifyConfig(min_overlap_m2=0.0, min_matched_wall_m=0, min_confidence=0.0).min_confidence == 0.0
+        assert SearchConfig(free_weights=(0.0, 1.0), working_cell_m=0.0).free_weights == (0.0, 1.0)
+
+    @pytest.mark.parametrize("value", [(-0.5, 1.0), (math.nan,), (1.0, math.inf)])
+    def test_weights_are_checked_one_by_one(self, value):
+        with pytest.raises(ConfigError, match="free_weights"):
+            SearchConfig(free_weights=value)
+
+    @pytest.mark.parametrize("value", [(1.1, 2.0), (0.4, 0.9), (2.5, 0.4), (0.0, 2.0), (-1.0, 2.0), (0.5, math.inf)])
+    def test_scales_lie_around_1(self, value):
+        with pytest.raises(ConfigError, match="scale_range"):
+            MergeConfig(scale_range=value)
+
+    def test_scales_may_be_1_only(self):
+        assert MergeConfig(scale_range=(1.0, 1.0)).scale_range == (1.0, 1.0)
+
+    @pytest.mark.parametrize("value", [1.0, 0.9])
+    def test_the_ratio_of_scales_is_more_than_1(self, value):
+        with pytest.raises(ConfigError, match="scale_step"):
+            SearchConfig(scale_step=value)
 
 
 class TestCells:

@@ -6,9 +6,19 @@ import numpy as np
 import pytest
 
 from mapmerge.grid import Grid
-from mapmerge.prepare import CELL_FREE, CELL_OCCUPIED, CELL_UNKNOWN, prepare, thinned
+from mapmerge.prepare import (
+    CELL_FREE,
+    CELL_OCCUPIED,
+    CELL_UNKNOWN,
+    CELL_UNSURE,
+    MEETS_FREE,
+    MEETS_NEAR,
+    MEETS_WALL,
+    prepare,
+    thinned,
+)
 from mapmerge.sim2 import Sim2
-from tests.floors import CONFIG, filled, flat, prepared_map
+from tests.floors import CONFIG, drawn, filled, flat, prepared_map, within
 
 
 class TestClasses:
@@ -16,7 +26,7 @@ class TestClasses:
         cells = np.array([[65, 64, 26, 25, 0, 100, -1]], np.int8)
         prepared = prepare(Grid(np.vstack([cells, np.zeros_like(cells)]), 0.5), 0.5, CONFIG)
         margin = prepared.margin
-        expected = [CELL_OCCUPIED, CELL_UNKNOWN, CELL_UNKNOWN, CELL_FREE, CELL_FREE, CELL_OCCUPIED, CELL_UNKNOWN]
+        expected = [CELL_OCCUPIED, CELL_UNSURE, CELL_UNSURE, CELL_FREE, CELL_FREE, CELL_OCCUPIED, CELL_UNKNOWN]
         assert prepared.classes[margin, margin:-margin].tolist() == expected
         assert (prepared.classes[:margin] == CELL_UNKNOWN).all()
 
@@ -37,8 +47,49 @@ class TestWalls:
         centres_m = (np.floor(points_m / 0.05) + 0.5) * 0.05
         away_m = np.hypot(*(centres_m[:, None] - prepared.wall_cells_m[None]).transpose(2, 0, 1))
         np.testing.assert_allclose(prepared.wall_distance_m.ravel()[index], away_m.min(axis=1), rtol=0.03, atol=1e-6)
-        nearest = prepared.nearest_wall.ravel()[index]
-        np.testing.assert_allclose(away_m[np.arange(300), nearest], away_m.min(axis=1), rtol=0.05, atol=1e-6)
+
+    def test_the_nearest_wall_is_that_of_a_search_but_for_a_square(self):
+        prepared = prepared_map(flat(Sim2(-1.0, -1.0, 0.3)))
+        points_m = np.random.default_rng(0).uniform(-0.8, np.add(prepared.extent_m, 0.8), (400, 2))
+        away_m = np.hypot(*(points_m[:, None] - prepared.walls_m[None]).transpose(2, 0, 1))
+        nearest = prepared.nearest.wall_at(*points_m.astype(np.float32).T)
+        slack_m = 2.0 * prepared.wall_spacing_m
+        assert (away_m[np.arange(400), nearest] <= away_m.min(axis=1) + slack_m).all()
+        # a wall is its own nearest one
+        assert np.array_equal(prepared.nearest.wall_at(*prepared.walls_m.astype(np.float32).T), np.arange(len(away_m.T)))
+
+    def test_no_wall_is_in_reach_of_a_place_beyond_the_padding(self):
+        prepared = prepared_map(flat())
+        far_m = np.array([[-30.0, 2.0], [2.0, 90.0], [1e6, -1e6], [40.0, 40.0]], np.float32)
+        nearest = prepared.nearest.wall_at(*far_m.T)
+        assert (np.hypot(*(prepared.walls_m[nearest] - far_m).T) > max(CONFIG.refine.rough_reject_m)).all()
+
+    @pytest.mark.parametrize("degrees", [0.0, 17.0, 45.0, 90.0, 133.0])
+    def test_directions_are_those_of_the_walls(self, degrees):
+        line = drawn(within(-99, -99, 99, 99), [(-3.0, 2.95, 3.0, 3.05)], size_m=(12.0, 12.0))
+        walls = prepared_map(line)
+        assert np.abs(walls.directions[3:-3] - (1.0, 0.0)).max() < 0.12
+        turned = drawn(
+            within(-99, -99, 99, 99),
+            [(-3.0, -0.05, 3.0, 0.05)],
+            size_m=(12.0, 12.0),
+            floor_from_map=Sim2(yaw_rad=-math.radians(degrees)) @ Sim2(-6.0, -6.0),
+        )
+        found = np.median(prepared_map(turned).directions, axis=0)
+        expected = math.cos(2 * math.radians(degrees)), math.sin(2 * math.radians(degrees))
+        np.testing.assert_allclose(found, expected, atol=0.12)
+
+    def test_directions_are_short_where_walls_are_no_line(self):
+        blob = prepared_map(filled(100, 40, 40))
+        middle = np.abs(blob.walls_m - 1.0).max(axis=1) < 0.5
+        assert np.hypot(*blob.directions[middle].T).max() < 0.1
+
+    def test_what_a_point_meets(self):
+        prepared = prepared_map(flat())
+        meets, distance_m = prepared.meets, prepared.wall_distance_m
+        assert np.array_equal((meets & MEETS_FREE) > 0, prepared.classes == CELL_FREE)
+        assert np.array_equal((meets & MEETS_WALL) > 0, distance_m <= CONFIG.verify.tolerance_m)
+        assert np.array_equal((meets & MEETS_NEAR) > 0, distance_m <= CONFIG.verify.near_m)
 
     def test_cells_are_where_the_grid_has_them(self):
         grid = flat(Sim2(-1.0, -1.0, 0.3))
@@ -92,7 +143,13 @@ class TestDegenerate:
     @pytest.mark.parametrize("coarser", [1.0, 1.6, 10.0])
     def test_has_an_outcome(self, grid, coarser):
         prepared = prepare(grid, grid.resolution_m * coarser, CONFIG)
-        assert prepared.classes.shape == prepared.wall_distance_m.shape == prepared.nearest_wall.shape
+        assert prepared.classes.shape == prepared.wall_distance_m.shape == prepared.meets.shape
+        assert prepared.directions.shape == prepared.walls_m.shape
+        assert np.isfinite(prepared.directions).all()
+        x, y = np.random.default_rng(0).uniform(-20.0, 20.0, (2, 50)).astype(np.float32)
+        nearest = prepared.nearest.wall_at(x, y)
+        assert (nearest >= 0).all()
+        assert (nearest < max(len(prepared.walls_m), 1)).all()
         assert len(prepared.wall_cells_m) == (prepared.classes == CELL_OCCUPIED).sum()
         assert not np.isnan(prepared.wall_distance_m).any()
         assert math.prod(prepared.extent_m) >= 0.0

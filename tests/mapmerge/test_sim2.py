@@ -84,3 +84,9 @@ class TestIsClose:
     def test_the_limits_themselves_are_close(self):
         assert IDENTITY.is_close(Sim2(x_m=0.1), at_m=(0.0, 0.0), **LIMITS)
         assert not IDENTITY.is_close(Sim2(x_m=math.nextafter(0.1, 1.0)), at_m=(0.0, 0.0), **LIMITS)
+
+    def test_compares_scales_as_angles(self):
+        """Either takes a point 1 m away by as much."""
+        assert IDENTITY.is_close(Sim2(scale=1.05), at_m=(0.0, 0.0), **LIMITS)
+        assert not IDENTITY.is_close(Sim2(scale=1.1), at_m=(0.0, 0.0), **LIMITS)
+        assert not IDENTITY.is_close(Sim2(scale=0.9), at_m=(0.0, 0.0), **LIMITS)

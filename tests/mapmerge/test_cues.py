@@ -1,0 +1,115 @@
+"""What speaks for and against a placement, and the confidence that follows."""
+
+import math
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from mapmerge.align import poses_of
+from mapmerge.config import MergeConfig
+from mapmerge.match.confidence import confidence
+from mapmerge.match.cues import Cues, cues_of
+from mapmerge.match.look import Look
+from mapmerge.sim2 import Sim2
+from mapmerge.verify import verify
+from tests.floors import filled, flat, pair_of_maps, walled_room
+
+CONFIG = MergeConfig()
+SHARES = ("wall_agreement", "other_wall_agreement", "far_share", "likeness", "rival_agreement", "acceptance")
+
+
+def against(*scores_m, share=0.5, matched_m=20.0):
+    """Return rivals, best first."""
+    count = len(scores_m)
+    return Look(poses_of([Sim2(9.0)] * count), np.array(scores_m), np.full(count, matched_m), np.full(count, share))
+
+
+def cues(pair, place=None, rivals=None):
+    """Return the cues of a placement between the grids: by default the one that lays the map frames on each other."""
+    placement = pair.between_grids(Sim2()) if place is None else place
+    scores = verify(pair.target.map, pair.source.map, placement, CONFIG.verify)
+    return cues_of(pair, placement, scores, against() if rivals is None else rivals, CONFIG.verify)
+
+
+FLATS = pair_of_maps(flat(ragged=1), flat(ragged=2))
+
+
+class TestOfTheTruth:
+    def test_all_speak_for_it(self):
+        found = cues(FLATS)
+        assert found.wall_agreement > 0.98
+        assert found.other_wall_agreement >= found.wall_agreement
+        assert found.far_share < 0.01
+        assert found.aligned > 0.9
+        assert found.tight_share > 0.9
+        assert found.held_m > 10.0
+        assert (found.likeness, found.rival_agreement) == (0.0, 0.0)
+
+    def test_are_those_of_the_scores(self):
+        scores = verify(FLATS.target.map, FLATS.source.map, FLATS.between_grids(Sim2()), CONFIG.verify)
+        found = cues(FLATS)
+        for name in ("matched_wall_m", "wall_agreement", "acceptance", "overlap_m2", "overlap_fraction"):
+            assert getattr(found, name) == getattr(scores, name)
+
+    def test_a_wrong_placement_has_worse_ones(self):
+        right = cues(FLATS)
+        for off in (Sim2(1.0, 0.7), Sim2(3.0, -1.0, 0.5)):
+            wrong = cues(FLATS, FLATS.between_grids(off))
+            assert wrong.wall_agreement < right.wall_agreement
+            assert wrong.far_share > right.far_share
+            assert wrong.tight_share < right.tight_share
+            assert wrong.held_m < right.held_m
+
+
+class TestRivals:
+    def test_are_compared_by_their_scores(self):
+        alone = cues(FLATS)
+        half = cues(FLATS, rivals=against(alone.lead_m / 2, 1.0))
+        assert half.likeness == pytest.approx(0.5)
+        assert half.lead_m == pytest.approx(alone.lead_m / 2)
+
+    @pytest.mark.parametrize("score_m", [-5.0, 0.0])
+    def test_one_that_is_none_does_not_count(self, score_m):
+        alone, found = cues(FLATS), cues(FLATS, rivals=against(score_m))
+        assert (found.likeness, found.lead_m) == (alone.likeness, alone.lead_m)
+
+    def test_a_better_one_is_as_good(self):
+        found = cues(FLATS, rivals=against(1e4))
+        assert (found.likeness, found.lead_m) == (1.0, 0.0)
+
+    def test_agreement_counts_of_those_that_match_enough_wall(self):
+        assert cues(FLATS, rivals=against(5.0, share=0.9)).rival_agreement == 0.9
+        assert cues(FLATS, rivals=against(5.0, share=0.9, matched_m=2.0)).rival_agreement == 0.0
+
+
+class TestHeld:
+    def test_nothing_keeps_a_hall_without_an_end_from_sliding(self):
+        open_hall, closed = (
+            cues(pair_of_maps(*(walled_room((12.0, 6.0), open_ends=ends, ragged=seed) for seed in (1, 2))))
+            for ends in (True, False)
+        )
+        assert open_hall.held_m < 0.25 * closed.held_m
+        assert closed.held_m == pytest.approx(12.0, rel=0.3)
+
+    @pytest.mark.parametrize("yaw_rad", [0.4, math.pi / 4, -2.0])
+    def test_a_turn_does_not_matter(self, yaw_rad):
+        still = cues(pair_of_maps(*(walled_room((12.0, 6.0), open_ends=False, ragged=seed) for seed in (1, 2))))
+        turned = cues(
+            pair_of_maps(
+                walled_room((12.0, 6.0), open_ends=False, ragged=1),
+                walled_room((12.0, 6.0), open_ends=False, ragged=2, yaw_rad=yaw_rad),
+            )
+        )
+        assert turned.aligned == pytest.approx(still.aligned, abs=0.1)
+        # thick walls that run obliquely have more points a metre
+        assert 0.75 * still.held_m < turned.held_m < 1.7 * still.held_m
+
+
+@pytest.mark.parametrize("place", [Sim2(), Sim2(90.0, 3.0, 2.0), Sim2(0.3, 0.1, 0.2, 1.7)])
+@pytest.mark.parametrize(("one", "other"), [(100, 100), (100, -1), (100, 0)])
+def test_maps_without_much_on_them_have_cues_and_a_confidence(one, other, place):
+    found = cues(pair_of_maps(filled(one, 30, 40), filled(other, 20, 20)), place, against(3.0))
+    assert all(math.isfinite(getattr(found, field.name)) for field in fields(Cues))
+    assert all(0.0 <= getattr(found, name) <= 1.0 for name in SHARES)
+    assert 0.0 <= confidence(found) <= 1.0

@@ -1,0 +1,146 @@
+"""Whether a placement is accepted and, in words, why or why not."""
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from mapmerge.config import VerifyConfig
+from mapmerge.match import Match, Rival
+from mapmerge.match.cues import Cues
+from mapmerge.match.verdict import contradicted, judge, too_little_structure
+from mapmerge.prior import Prior
+from mapmerge.reasons import Reason, ReasonCode
+from mapmerge.sim2 import Sim2
+from mapmerge.verify import Scores
+from tests.floors import described, errors, filled, flat, pair_of_maps
+
+LIMITS = VerifyConfig()
+SURE = LIMITS.min_confidence
+GOOD = Scores(
+    score_m=60.0,
+    acceptance=0.98,
+    overlap_m2=40.0,
+    overlap_fraction=0.6,
+    wall_agreement=0.95,
+    matched_wall_m=45.0,
+    violated_wall_m=1.0,
+)
+CUES = Cues(
+    matched_wall_m=45.0,
+    wall_agreement=0.95,
+    other_wall_agreement=0.97,
+    far_share=0.01,
+    likeness=0.2,
+    lead_m=48.0,
+    rival_agreement=0.4,
+    acceptance=0.98,
+    overlap_m2=40.0,
+    overlap_fraction=0.6,
+    aligned=0.95,
+    held_m=15.0,
+    tight_share=0.9,
+)
+
+
+class TestJudge:
+    def test_accepts_what_is_sure(self):
+        reason = judge(GOOD, CUES, 0.9999, LIMITS)
+        assert reason.code is ReasonCode.ACCEPTED
+        assert "40 m²" in reason.message
+
+    @pytest.mark.parametrize(
+        ("change", "code", "says"),
+        [
+            ({"overlap_m2": 9.9}, ReasonCode.TOO_LITTLE_OVERLAP, "9.9 m²"),
+            ({"matched_wall_m": 7.9}, ReasonCode.TOO_LITTLE_OVERLAP, "7.9 m of wall"),
+        ],
+    )
+    @pytest.mark.parametrize("confidence", [0.1, 1.0])
+    def test_too_little_is_never_accepted(self, change, code, says, confidence):
+        reason = judge(replace(GOOD, **change), CUES, confidence, LIMITS)
+        assert reason.code is code
+        assert says in reason.message
+
+    @pytest.mark.parametrize(
+        ("scores", "cues", "code", "says"),
+        [
+            ({"wall_agreement": 0.7}, {}, ReasonCode.WALLS_DISAGREE, "70%"),
+            ({"score_m": -3.0}, {}, ReasonCode.WALLS_DISAGREE, "95%"),
+            ({"wall_agreement": 0.7}, {"likeness": 0.9}, ReasonCode.WALLS_DISAGREE, "70%"),
+            ({}, {"likeness": 0.9}, ReasonCode.AMBIGUOUS, "0.90 times"),
+            ({}, {}, ReasonCode.LOW_CONFIDENCE, "40 m²"),
+        ],
+    )
+    def test_says_what_speaks_most_against_what_is_not_sure(self, scores, cues, code, says):
+        reason = judge(replace(GOOD, **scores), replace(CUES, **cues), 0.42, LIMITS)
+        assert reason.code is code
+        assert says in reason.message
+        assert "42 %" in reason.message
+
+    @pytest.mark.parametrize("exactly", [{"overlap_m2": 10.0}, {"matched_wall_m": 8.0}])
+    def test_the_limits_themselves_pass(self, exactly):
+        assert judge(replace(GOOD, **exactly), CUES, SURE, LIMITS).code is ReasonCode.ACCEPTED
+
+    def test_only_the_confidence_decides_over_what_is_large_enough(self):
+        poor = replace(GOOD, wall_agreement=0.5), replace(CUES, likeness=0.99)
+        assert judge(*poor, SURE, LIMITS).code is ReasonCode.ACCEPTED
+
+    @pytest.mark.parametrize("change", [{"overlap_m2": 9.97}, {"matched_wall_m": 7.999}])
+    def test_a_near_miss_does_not_read_like_a_contradiction(self, change):
+        """Not "the maps share 10.0 m² of ground, less than 10 m²"."""
+        message = judge(replace(GOOD, **change), CUES, 1.0, LIMITS).message
+        found, least = map(float, re.findall(r"\d+(?:\.\d+)?", message))
+        assert found < least
+
+    @pytest.mark.parametrize("least", [0.5, 0.9, 0.95, 0.999, 0.9999])
+    @pytest.mark.parametrize("below", [1e-9, 1e-6, 1e-4, 0.01, 0.3])
+    def test_neither_does_a_confidence_that_is_nearly_enough(self, least, below):
+        message = judge(GOOD, CUES, least - below, replace(LIMITS, min_confidence=least)).message
+        found, limit = map(float, re.findall(r"(\d+(?:\.\d+)?) %", message))
+        assert found < limit
+        assert limit == pytest.approx(100 * least)
+
+
+class TestStructure:
+    def test_both_maps_need_walls(self):
+        rich, poor = described(flat()), described(filled(100, 1, 100))
+        assert too_little_structure(rich, rich, LIMITS) is None
+        for pair in ((rich, poor), (poor, rich), (poor, poor)):
+            reason = too_little_structure(*pair, LIMITS)
+            assert reason.code is ReasonCode.TOO_LITTLE_STRUCTURE
+            assert "5.0 m of wall" in reason.message
+
+
+    @pytest.mark.parametrize("least_m", [0.0, 8.0])
+    def test_without_a_wall_nothing_can_be_placed_whatever_is_asked_for(self, least_m):
+        rich, none = described(flat()), described(filled(0, 30, 40))
+        limits = replace(LIMITS, min_matched_wall_m=least_m)
+        for pair in ((rich, none), (none, rich), (none, none)):
+            reason = too_little_structure(*pair, limits)
+            assert reason.code is ReasonCode.TOO_LITTLE_STRUCTURE
+            assert reason.message == "one of the maps shows no wall at all"
+
+
+class TestContradicted:
+    PRIOR = Prior(Sim2(5.0, 1.0, 0.3), 0.1, 0.1, 0.02, "given for r2")
+    REASON = Reason(ReasonCode.WALLS_DISAGREE, "of the walls in the overlap 12% agree")
+    BELIEVED = Match(Sim2(5.02, 1.0, 0.3), GOOD, False, REASON, rivals=(Rival(Sim2(5.1, 1.0, 0.3), 1.0),))
+    ELSEWHERE = Match(Sim2(-1.0, 2.0, 1.0), replace(GOOD, score_m=70.0), True, Reason(ReasonCode.ACCEPTED, "fits"))
+
+    def test_shows_the_free_placement_as_first_rival(self):
+        match = contradicted(self.BELIEVED, self.ELSEWHERE, self.PRIOR, pair_of_maps(flat(), flat(), self.PRIOR), LIMITS)
+        assert not match.accepted
+        assert match.reason.code is ReasonCode.PRIOR_CONTRADICTED
+        assert match.target_from_source == self.BELIEVED.target_from_source
+        assert match.rivals == (Rival(Sim2(-1.0, 2.0, 1.0), 70.0), *self.BELIEVED.rivals)
+        for words in ("given for r2", self.REASON.message, "x -1.00 m", "y 2.00 m", "yaw 1.000 rad"):
+            assert words in match.reason.message
+
+    def test_without_a_placement_the_believed_one_is_shown_with_its_figures(self):
+        nothing = Match(None, None, False, Reason(ReasonCode.NO_CANDIDATE, "no placement at all was found"))
+        match = contradicted(nothing, self.ELSEWHERE, self.PRIOR, pair_of_maps(flat(), flat(), self.PRIOR), LIMITS)
+        assert match.reason.code is ReasonCode.PRIOR_CONTRADICTED
+        assert errors(match.target_from_source, self.PRIOR.target_from_source, (0.0, 0.0)) == pytest.approx((0.0, 0.0))
+        assert match.scores.overlap_m2 < 40.0
+        assert match.rivals[0].target_from_source == Sim2(-1.0, 2.0, 1.0)

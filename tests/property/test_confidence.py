@@ -1,0 +1,85 @@
+"""Laws of the confidence, whatever model it comes from."""
+
+import math
+from dataclasses import replace
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mapmerge.match.confidence import confidence
+from mapmerge.match.cues import Cues
+
+shares = st.floats(0.0, 1.0)
+lengths_m = st.floats(0.0, 500.0)
+
+
+@st.composite
+def cues_of_some_placement(draw):
+    worse, better = sorted((draw(shares), draw(shares)))
+    return Cues(
+        matched_wall_m=draw(lengths_m),
+        wall_agreement=worse,
+        other_wall_agreement=better,
+        far_share=draw(shares) * (1 - worse),
+        likeness=draw(shares),
+        lead_m=draw(lengths_m),
+        rival_agreement=draw(shares),
+        acceptance=draw(shares),
+        overlap_m2=draw(st.floats(0.0, 5000.0)),
+        overlap_fraction=draw(shares),
+        aligned=draw(st.floats(-1.0, 1.0)),
+        held_m=draw(lengths_m),
+        tight_share=draw(shares),
+    )
+
+
+anything = cues_of_some_placement()
+ROUNDING = 1e-12
+
+
+@given(anything)
+def test_is_a_probability(cues):
+    assert math.isfinite(confidence(cues))
+    assert 0.0 <= confidence(cues) <= 1.0
+
+
+@given(anything, shares)
+def test_more_agreement_never_lowers_it(cues, share):
+    """Of both directions together: the worse one stays the worse one."""
+    more = cues.wall_agreement + share * (1.0 - cues.wall_agreement)
+    better = replace(cues, wall_agreement=more, other_wall_agreement=max(more, cues.other_wall_agreement))
+    assert confidence(better) >= confidence(cues) - ROUNDING
+
+
+@given(anything, shares)
+def test_walls_amid_free_space_never_raise_it(cues, share):
+    worse = replace(cues, far_share=cues.far_share + share * (1.0 - cues.far_share))
+    assert confidence(worse) <= confidence(cues) + ROUNDING
+
+
+@given(anything, shares)
+def test_a_rival_that_is_more_alike_never_raises_it(cues, share):
+    """Its score comes nearer, so that the lead shrinks."""
+    likeness = cues.likeness + share * (1.0 - cues.likeness)
+    lead_m = cues.lead_m * (1.0 - likeness) / max(1.0 - cues.likeness, 1e-9)
+    rival = replace(cues, likeness=likeness, lead_m=min(lead_m, cues.lead_m))
+    assert confidence(rival) <= confidence(cues) + ROUNDING
+
+
+@given(anything, shares)
+def test_a_rival_that_agrees_better_never_raises_it(cues, share):
+    rival = replace(cues, rival_agreement=cues.rival_agreement + share * (1.0 - cues.rival_agreement))
+    assert confidence(rival) <= confidence(cues) + ROUNDING
+
+
+@given(anything, st.floats(1.0, 5.0))
+def test_more_of_the_same_never_lowers_it(cues, factor):
+    """Larger maps that agree as well as these: more wall, more ground, a larger lead, firmer hold."""
+    larger = replace(
+        cues,
+        matched_wall_m=cues.matched_wall_m * factor,
+        held_m=cues.held_m * factor,
+        lead_m=cues.lead_m * factor,
+        overlap_m2=cues.overlap_m2 * factor,
+    )
+    assert confidence(larger) >= confidence(cues) - ROUNDING
