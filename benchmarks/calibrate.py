@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 AGAINST = {"far_share", "bend_m", "likeness", "rival_agreement"}
 """Cues that speak against a placement; all others speak for it."""
 _QUANTILES = (0.02, 0.15, 0.35, 0.6, 0.85, 0.98)
-_PENALTY = 2e-5
+_PENALTY = 2e-6
 _STEPS = 6000
 
 

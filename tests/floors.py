@@ -267,7 +267,9 @@ def walled_room(
     walls = outline(0.0, 0.0, *size_m)
     side_m = math.hypot(*size_m) + 2.0
     corner = Sim2(width_m / 2, height_m / 2, yaw_rad) @ Sim2(-side_m / 2, -side_m / 2)
-    known = within(0.0, -0.2, width_m, height_m + 0.2) if open_ends else within(-0.2, -0.2, width_m + 0.2, height_m + 0.2)
+    known = (
+        within(0.0, -0.2, width_m, height_m + 0.2) if open_ends else within(-0.2, -0.2, width_m + 0.2, height_m + 0.2)
+    )
     grid = drawn(known, walls, size_m=(side_m, side_m), floor_from_map=corner, ragged=ragged)
     centres_m = corner.apply(grid.centres_m(np.ones(grid.cells.shape, np.bool_))).T
     cells = np.where(known(*centres_m).reshape(grid.cells.shape), grid.cells, UNKNOWN).astype(np.int8)

@@ -108,7 +108,8 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
 
 def _search(pair: PairOfMaps, rotations: tuple[float, ...], config: MergeConfig) -> _Found | None:
     """Return the best placement and its rivals, after a second look if the first one is not clear."""
-    scales, steps = (1.0, 1.0), (1.0,)
+    scales: tuple[float, float] = (1.0, 1.0)
+    steps: tuple[float, ...] = (1.0,)
     if config.scale == "free":
         least, largest = config.scale_range
         scales = (1 / largest, 1 / least) if pair.swapped else (least, largest)
