@@ -1,7 +1,7 @@
 """What speaks for and against a placement, and the confidence that follows."""
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -22,7 +22,8 @@ SHARES = ("wall_agreement", "other_wall_agreement", "far_share", "likeness", "ri
 def against(*scores_m, share=0.5, matched_m=20.0):
     """Return rivals, best first."""
     count = len(scores_m)
-    return Look(poses_of([Sim2(9.0)] * count), np.array(scores_m), np.full(count, matched_m), np.full(count, share))
+    figures = (np.full(count, value) for value in (matched_m, share, 30.0))
+    return Look(poses_of([Sim2(9.0)] * count), np.array(scores_m), *figures)
 
 
 def cues(pair, place=None, rivals=None):
@@ -113,3 +114,11 @@ def test_maps_without_much_on_them_have_cues_and_a_confidence(one, other, place)
     assert all(math.isfinite(getattr(found, field.name)) for field in fields(Cues))
     assert all(0.0 <= getattr(found, name) <= 1.0 for name in SHARES)
     assert 0.0 <= confidence(found) <= 1.0
+
+
+def test_a_rival_that_is_as_good_leaves_an_even_chance():
+    """However much wall agrees, such as at a corridor whose rooms nobody can tell apart."""
+    sure = Cues(227.0, 1.0, 1.0, 0.0, 0.2, 200.0, 0.4, 0.995, 140.0, 0.99, 0.95, 67.0, 0.97)
+    assert confidence(sure) > CONFIG.verify.min_confidence
+    assert confidence(replace(sure, likeness=0.98, lead_m=5.0, rival_agreement=1.0)) < 0.6
+    assert confidence(replace(sure, likeness=1.0, lead_m=0.0, rival_agreement=1.0)) <= 0.5

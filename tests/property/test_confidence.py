@@ -83,3 +83,9 @@ def test_more_of_the_same_never_lowers_it(cues, factor):
         overlap_m2=cues.overlap_m2 * factor,
     )
     assert confidence(larger) >= confidence(cues) - ROUNDING
+
+
+@given(anything, st.floats(0.999, 1.0))
+def test_of_two_placements_that_are_as_good_one_is_wrong(cues, likeness):
+    """However well both fit."""
+    assert confidence(replace(cues, likeness=likeness, lead_m=0.0)) <= 0.51
