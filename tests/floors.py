@@ -234,7 +234,7 @@ HALL_WALLS = [
 
 
 def hall_and_part(corner_m: tuple[float, float], yaw_rad: float) -> tuple[Grid, Grid, Sim2]:
-    """Return a hall of 60 × 40 m, a part of 13 × 11 m of it mapped in another frame, and where that lies in the hall."""
+    """Return a hall of 60 × 40 m, a part of 13 × 11 m of it in another frame, and where that lies in the hall."""
     x_m, y_m = corner_m
     hall_from_part = Sim2(x_m + 6.5, y_m + 5.5, yaw_rad) @ Sim2(-9.0, -9.0)
     hall = drawn(within(0.0, 0.0, 60.0, 40.0), HALL_WALLS, size_m=(61.0, 41.0), floor_from_map=Sim2(-0.5, -0.5))
@@ -267,7 +267,9 @@ def walled_room(
     walls = outline(0.0, 0.0, *size_m)
     side_m = math.hypot(*size_m) + 2.0
     corner = Sim2(width_m / 2, height_m / 2, yaw_rad) @ Sim2(-side_m / 2, -side_m / 2)
-    known = within(0.0, -0.2, width_m, height_m + 0.2) if open_ends else within(-0.2, -0.2, width_m + 0.2, height_m + 0.2)
+    known = (
+        within(0.0, -0.2, width_m, height_m + 0.2) if open_ends else within(-0.2, -0.2, width_m + 0.2, height_m + 0.2)
+    )
     grid = drawn(known, walls, size_m=(side_m, side_m), floor_from_map=corner, ragged=ragged)
     centres_m = corner.apply(grid.centres_m(np.ones(grid.cells.shape, np.bool_))).T
     cells = np.where(known(*centres_m).reshape(grid.cells.shape), grid.cells, UNKNOWN).astype(np.int8)

@@ -77,7 +77,9 @@ class TestPrior:
 
 class TestScales:
     @pytest.mark.parametrize("step", [1.01, 1.05, 1.3])
-    @pytest.mark.parametrize("ends", [(0.4, 2.5), (0.9, 1.1), (0.5, 1.0), (1.0, 3.0), (0.97, 2.0), (1.0, 1.0), (0.999, 1.001)])
+    @pytest.mark.parametrize(
+        "ends", [(0.4, 2.5), (0.9, 1.1), (0.5, 1.0), (1.0, 3.0), (0.97, 2.0), (1.0, 1.0), (0.999, 1.001)]
+    )
     def test_hold_1_and_span_the_range(self, ends, step):
         scales = all_scales(*ends, step)
         assert 1.0 in scales

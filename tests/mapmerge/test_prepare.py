@@ -56,7 +56,9 @@ class TestWalls:
         slack_m = 2.0 * prepared.wall_spacing_m
         assert (away_m[np.arange(400), nearest] <= away_m.min(axis=1) + slack_m).all()
         # a wall is its own nearest one
-        assert np.array_equal(prepared.nearest.wall_at(*prepared.walls_m.astype(np.float32).T), np.arange(len(away_m.T)))
+        assert np.array_equal(
+            prepared.nearest.wall_at(*prepared.walls_m.astype(np.float32).T), np.arange(len(away_m.T))
+        )
 
     def test_no_wall_is_in_reach_of_a_place_beyond_the_padding(self):
         prepared = prepared_map(flat())

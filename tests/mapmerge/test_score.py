@@ -24,7 +24,8 @@ class TestWalls:
     """A wall of 6 m at y = 3 m in the target, free space on both sides of it; the same wall in the source."""
 
     @pytest.mark.parametrize(
-        ("up_m", "matched", "near", "far"), [(0.0, 1, 0, 0), (0.15, 1, 0, 0), (0.35, 0, 1, 0), (1.0, 0, 0, 1), (5.0, 0, 0, 0)]
+        ("up_m", "matched", "near", "far"),
+        [(0.0, 1, 0, 0), (0.15, 1, 0, 0), (0.35, 0, 1, 0), (1.0, 0, 0, 1), (5.0, 0, 0, 0)],
     )
     def test_on_a_wall_beside_it_amid_free_space_and_outside(self, up_m, matched, near, far):
         pose = TARGET.grid.map_from_grid.inverse() @ Sim2(0.0, up_m) @ ONLY_THE_WALL.grid.map_from_grid

@@ -111,7 +111,6 @@ class TestStructure:
             assert reason.code is ReasonCode.TOO_LITTLE_STRUCTURE
             assert "5.0 m of wall" in reason.message
 
-
     @pytest.mark.parametrize("least_m", [0.0, 8.0])
     def test_without_a_wall_nothing_can_be_placed_whatever_is_asked_for(self, least_m):
         rich, none = described(flat()), described(filled(0, 30, 40))
@@ -129,7 +128,9 @@ class TestContradicted:
     ELSEWHERE = Match(Sim2(-1.0, 2.0, 1.0), replace(GOOD, score_m=70.0), True, Reason(ReasonCode.ACCEPTED, "fits"))
 
     def test_shows_the_free_placement_as_first_rival(self):
-        match = contradicted(self.BELIEVED, self.ELSEWHERE, self.PRIOR, pair_of_maps(flat(), flat(), self.PRIOR), LIMITS)
+        match = contradicted(
+            self.BELIEVED, self.ELSEWHERE, self.PRIOR, pair_of_maps(flat(), flat(), self.PRIOR), LIMITS
+        )
         assert not match.accepted
         assert match.reason.code is ReasonCode.PRIOR_CONTRADICTED
         assert match.target_from_source == self.BELIEVED.target_from_source

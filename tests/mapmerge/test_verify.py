@@ -1,13 +1,14 @@
 """The figures of a placement, and the tests that it must pass."""
 
 import math
+
 import numpy as np
 import pytest
 
 from mapmerge.config import VerifyConfig
 from mapmerge.grid import Grid
-from mapmerge.sim2 import IDENTITY, Sim2
 from mapmerge.prepare import prepare
+from mapmerge.sim2 import IDENTITY, Sim2
 from mapmerge.verify import Scores, cell_agreement, rank_score_m, verify
 from tests.floors import CONFIG, drawn, filled, flat, prepared_map, with_another_label, within
 
