@@ -23,7 +23,7 @@ from mapmerge.match.cues import Cues
 
 Array = NDArray[np.float64]
 
-AGAINST = {"far_share", "likeness", "rival_agreement"}
+AGAINST = {"far_share", "bend_m", "likeness", "rival_agreement"}
 """Cues that speak against a placement; all others speak for it."""
 _QUANTILES = (0.02, 0.15, 0.35, 0.6, 0.85, 0.98)
 _PENALTY = 2e-5

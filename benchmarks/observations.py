@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.bends import BENT_SHARE, bent
 from benchmarks.recorded_cuts import cut_pairs, cut_strangers, unrelated
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
@@ -90,7 +91,13 @@ def jobs(missions: int, cuts: int) -> list[Job]:
 def observed(job: Job) -> list[Observation]:
     """Match the pairs of a job."""
     made = _recorded(job.first) if job.group == "recorded" else _simulated(job.group, job.first)
-    return [item for pair, held_out in made if (item := _observation(pair, job.group, held_out=held_out))]
+    rng = np.random.default_rng([job.first, 80])
+    found = []
+    for pair, held_out in made:
+        shown = bent(pair, rng) if rng.uniform() < BENT_SHARE else pair
+        item = _observation(shown, job.group, held_out=held_out)
+        found += [item] if item else []
+    return found
 
 
 def collect(work: Sequence[Job], path: Path, processes: int) -> None:

@@ -3,43 +3,30 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Literal
 
 from mapmerge.errors import ConfigError
+from mapmerge.paper.config import ExistingConfig, PaperConfig, RansacConfig
+from mapmerge.settings import Settings
+
+__all__ = [
+    "CellConfig",
+    "ExistingConfig",
+    "MergeConfig",
+    "PaperConfig",
+    "RansacConfig",
+    "RefineConfig",
+    "ScaleChoice",
+    "SearchConfig",
+    "VerifyConfig",
+]
 
 ScaleChoice = Literal["metadata", "free"]
 
-_DIVISORS = {
-    "scale_range",
-    "wall_spacing_m",
-    "angle_step_rad",
-    "cell_m",
-    "reject_m",
-    "rough_reject_m",
-    "sweep_step_rad",
-    "sweep_cell_m",
-    "scale_step",
-    "blur_cells",
-}
-
 
 @dataclass(frozen=True, slots=True)
-class _Settings:
-    """Base of all settings: numbers must be finite and not negative."""
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            for number in value if isinstance(value, tuple) else (value,):
-                if isinstance(number, (int, float)) and not (math.isfinite(number) and number >= 0):
-                    raise ConfigError(f"{item.name} is {value}; expected finite numbers that are not negative")
-            if item.name in _DIVISORS and not (min(value, default=1.0) if isinstance(value, tuple) else value) > 0:
-                raise ConfigError(f"{item.name} is {value}; expected more than 0")
-
-
-@dataclass(frozen=True, slots=True)
-class CellConfig(_Settings):
+class CellConfig(Settings):
     """When a cell counts as occupied or free (paper, equation 1)."""
 
     p_occupied: float = 0.65
@@ -64,7 +51,7 @@ class CellConfig(_Settings):
 
 
 @dataclass(frozen=True, slots=True)
-class SearchConfig(_Settings):
+class SearchConfig(Settings):
     """How candidates for a placement are found.
 
     Parameters
@@ -128,7 +115,7 @@ class SearchConfig(_Settings):
 
 
 @dataclass(frozen=True, slots=True)
-class RefineConfig(_Settings):
+class RefineConfig(Settings):
     """How candidates are aligned (ICP against the nearest walls).
 
     Parameters
@@ -163,7 +150,32 @@ class RefineConfig(_Settings):
 
 
 @dataclass(frozen=True, slots=True)
-class VerifyConfig(_Settings):
+class SlackConfig(Settings):
+    """How far maps may be bent, as by a SLAM's drift.
+
+    Parameters
+    ----------
+    cell_m
+        Side of the squares of the field of shifts.
+    length_m
+        Shifts are alike over about this distance.
+    most_m
+        Largest shift.
+    reject_m
+        One step for each of these, beyond which walls are not drawn to each other.
+    stiffness
+        How much wall, in points, it takes to shift its surroundings by half of what it asks for.
+    """
+
+    cell_m: float = 0.5
+    length_m: float = 1.5
+    most_m: float = 0.9
+    reject_m: tuple[float, ...] = (0.9, 0.9, 0.7, 0.5, 0.4, 0.3)
+    stiffness: float = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class VerifyConfig(Settings):
     """What a placement must pass to be accepted.
 
     Parameters
@@ -215,7 +227,7 @@ class VerifyConfig(_Settings):
 
 
 @dataclass(frozen=True, slots=True)
-class MergeConfig(_Settings):
+class MergeConfig(Settings):
     """All settings of the merger.
 
     Parameters
@@ -237,7 +249,10 @@ class MergeConfig(_Settings):
     cells: CellConfig = field(default_factory=CellConfig)
     search: SearchConfig = field(default_factory=SearchConfig)
     refine: RefineConfig = field(default_factory=RefineConfig)
+    slack: SlackConfig = field(default_factory=SlackConfig)
     verify: VerifyConfig = field(default_factory=VerifyConfig)
+    paper: PaperConfig = field(default_factory=PaperConfig)
+    existing: ExistingConfig = field(default_factory=ExistingConfig)
     moved_m: float = 0.10
     moved_rad: float = math.radians(0.5)
 

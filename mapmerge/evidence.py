@@ -1,4 +1,4 @@
-"""What a matcher saw, kept as data: curves, surfaces, overlays. `mapmerge.render` makes pictures of it.
+"""What a matcher saw, kept as data: curves, surfaces, overlays, marked images. `mapmerge.render` makes pictures of it.
 
 A matcher describes each of its steps with one of these kinds, so that a new matcher needs no new drawing code.
 """
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmerge.prepare import PreparedMap
-from mapmerge.sim2 import Sim2
+from mapmerge.sim2 import Points, Sim2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,4 +80,40 @@ class OverlayEvidence:
     tolerance_m: float
 
 
-Evidence = CurvesEvidence | SurfaceEvidence | OverlayEvidence
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkedImage:
+    """A picture with marked places.
+
+    Parameters
+    ----------
+    label
+        Whose picture it is.
+    pixels
+        Shape (rows, columns), uint8, grey; row 0 has the lowest y.
+    marks
+        Shape (N, 2): column and row of marked places, whole numbers at the centres of pixels.
+    """
+
+    label: str
+    pixels: NDArray[np.uint8]
+    marks: Points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImagesEvidence:
+    """Pictures of the target and the source side by side, with marks, and lines between marks that were paired.
+
+    Parameters
+    ----------
+    pairs
+        Shape (N, 2): a mark of the first picture and one of the second.
+    """
+
+    step: str
+    title: str
+    target: MarkedImage
+    source: MarkedImage
+    pairs: NDArray[np.intp]
+
+
+Evidence = CurvesEvidence | SurfaceEvidence | OverlayEvidence | ImagesEvidence

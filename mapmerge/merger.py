@@ -222,9 +222,9 @@ def _linked(
 
 def _placed(centres_m: Mapping[str, tuple[float, float]], pairs: Mapping[Pair, Match], config: MergeConfig) -> Forest:
     edges = [
-        Edge(target, source, match.target_from_source, match.scores.score_m, centres_m[source])
+        Edge(target, source, match.target_from_source, match.trust, centres_m[source])
         for (target, source), match in pairs.items()
-        if match.accepted and match.target_from_source is not None and match.scores is not None
+        if match.accepted and match.target_from_source is not None
     ]
     limits = config.verify
     return place(list(centres_m), edges, distance_m=limits.distinct_m, angle_rad=limits.distinct_rad)

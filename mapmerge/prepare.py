@@ -53,6 +53,13 @@ class NearestWalls:
         found: NDArray[np.int32] = self.index.ravel()[row * cols + col]
         return found
 
+    def distance_m(self, walls_m: Points, x_m: NDArray[np.float32], y_m: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return how far places are from the nearest of `PreparedMap.walls_m`; infinitely without any wall."""
+        if len(walls_m) == 0:
+            return np.full(x_m.shape, np.inf)
+        wall = self.wall_at(x_m, y_m)
+        return np.asarray(np.hypot(walls_m[wall, 0] - x_m, walls_m[wall, 1] - y_m), np.float64)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedMap:

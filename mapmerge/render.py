@@ -8,30 +8,22 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.evidence import CurvesEvidence, Evidence, OverlayEvidence, SurfaceEvidence
+from mapmerge.drawing import AGREE, BANNER_PX, INK, MARK, MAX_SIDE_PX, PAPER, Colour, Rgb, text, titled
+from mapmerge.evidence import CurvesEvidence, Evidence, ImagesEvidence, OverlayEvidence, SurfaceEvidence
 from mapmerge.prepare import CELL_FREE, CELL_UNKNOWN, PreparedMap
+from mapmerge.render_images import side_by_side
 from mapmerge.sim2 import Points, Sim2
 
-Rgb = NDArray[np.uint8]
-Colour = tuple[int, int, int]
+__all__ = ["MAX_SIDE_PX", "Picture", "Rgb", "render"]
 
-MAX_SIDE_PX = 1024
-_BANNER_PX = 36
-
-_PAPER: Colour = (255, 255, 255)
-_INK: Colour = (60, 60, 60)
 _FAINT: Colour = (222, 222, 222)
 _SERIES: tuple[Colour, ...] = ((31, 119, 180), (255, 127, 14), (44, 160, 44), (148, 103, 189))
-_MARK: Colour = (214, 39, 40)
 _UNKNOWN: Colour = (205, 205, 205)
 _FREE_ONE: Colour = (238, 238, 238)
 _FREE_BOTH: Colour = (255, 255, 255)
 _WALL_TARGET: Colour = (70, 110, 180)
 _WALL_SOURCE: Colour = (225, 150, 50)
-_AGREE: Colour = (20, 150, 60)
 _DISAGREE: Colour = (220, 30, 40)
-
-_FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +54,8 @@ def render(evidence: Evidence) -> Picture:
             rgb = _surface(evidence)
         case OverlayEvidence():
             rgb = _overlay(evidence)
+        case ImagesEvidence():
+            rgb = side_by_side(evidence)
     return Picture(evidence.step, evidence.title, rgb)
 
 
@@ -70,7 +64,7 @@ def _curves(evidence: CurvesEvidence) -> Rgb:
     width, panel, left, right, top = 960, 170, 24, 936, 40
     height = top + panel * len(evidence.curves) + 46
     image = np.full((height, width, 3), 255, np.uint8)
-    _text(image, evidence.title, (left, 26), 0.6)
+    text(image, evidence.title, (left, 26), 0.6)
     span = evidence.stop - evidence.start
 
     def x_px(abscissa: float) -> int:
@@ -79,13 +73,13 @@ def _curves(evidence: CurvesEvidence) -> Rgb:
     for index, curve in enumerate(evidence.curves):
         low, high = top + panel * (index + 1) - 12, top + panel * index + 18
         for mark in evidence.marks:
-            cv2.line(image, (x_px(mark), high), (x_px(mark), low), _FAINT if index < 2 else _MARK, 1)
-        cv2.line(image, (left, low), (right, low), _INK, 1)
+            cv2.line(image, (x_px(mark), high), (x_px(mark), low), _FAINT if index < 2 else MARK, 1)
+        cv2.line(image, (left, low), (right, low), INK, 1)
         _polyline(image, curve.values, (left, right), (low, high), _SERIES[index % len(_SERIES)])
-        _text(image, curve.label, (left + 6, high + 8), 0.5, _SERIES[index % len(_SERIES)])
+        text(image, curve.label, (left + 6, high + 8), 0.5, _SERIES[index % len(_SERIES)])
     for tick in np.linspace(evidence.start, evidence.stop, 7):
-        _text(image, f"{tick:g}", (x_px(float(tick)) - 10, height - 26), 0.45)
-    _text(image, evidence.axis, (width // 2 - 40, height - 8), 0.5)
+        text(image, f"{tick:g}", (x_px(float(tick)) - 10, height - 26), 0.45)
+    text(image, evidence.axis, (width // 2 - 40, height - 8), 0.5)
     return image
 
 
@@ -105,16 +99,16 @@ def _surface(evidence: SurfaceEvidence) -> Rgb:
     values = evidence.values
     low, high = float(np.percentile(values, 5)), float(values.max())
     scaled = np.clip((values - low) / (high - low) * 255 if high > low else values * 0, 0, 255)
-    zoom = (MAX_SIDE_PX - _BANNER_PX) / max(values.shape)
+    zoom = (MAX_SIDE_PX - BANNER_PX) / max(values.shape)
     size = (max(1, int(values.shape[1] * zoom)), max(1, int(values.shape[0] * zoom)))
     interpolation = cv2.INTER_AREA if zoom < 1 else cv2.INTER_LINEAR
     grey = cv2.resize(scaled.astype(np.uint8)[::-1], size, interpolation=interpolation)
     image: Rgb = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_VIRIDIS)[:, :, ::-1], np.uint8)
     for row, col in evidence.marks:
-        cv2.circle(image, _pixel(row, col, values.shape, zoom), 9, _PAPER, 1, cv2.LINE_AA)
+        cv2.circle(image, _pixel(row, col, values.shape, zoom), 9, PAPER, 1, cv2.LINE_AA)
     if evidence.chosen is not None:
-        cv2.circle(image, _pixel(*evidence.chosen, values.shape, zoom), 14, _MARK, 3, cv2.LINE_AA)
-    return _titled(image, evidence.title)
+        cv2.circle(image, _pixel(*evidence.chosen, values.shape, zoom), 14, MARK, 3, cv2.LINE_AA)
+    return titled(image, evidence.title)
 
 
 def _pixel(row: int, col: int, shape: tuple[int, ...], zoom: float) -> tuple[int, int]:
@@ -126,7 +120,7 @@ def _overlay(evidence: OverlayEvidence) -> Rgb:
     target, source, pose = evidence.target, evidence.source, evidence.target_from_source
     corners = np.concatenate([_corners(target), pose.apply(_corners(source))])
     low, high = corners.min(axis=0) - 0.5, corners.max(axis=0) + 0.5
-    pixel_m = max(target.resolution_m / 2, float((high - low).max()) / (MAX_SIDE_PX - _BANNER_PX))
+    pixel_m = max(target.resolution_m / 2, float((high - low).max()) / (MAX_SIDE_PX - BANNER_PX))
     cols, rows = (max(1, int(side / pixel_m)) for side in high - low)
 
     image = _ground(evidence, low, pixel_m, rows, cols)
@@ -143,9 +137,9 @@ def _overlay(evidence: OverlayEvidence) -> Rgb:
         _dots(image, at[~matched & ~violated], low, pixel_m, there)
         agree.append(at[matched])
         disagree.append(at[violated])
-    _dots(image, np.concatenate(agree), low, pixel_m, _AGREE)
+    _dots(image, np.concatenate(agree), low, pixel_m, AGREE)
     _dots(image, np.concatenate(disagree), low, pixel_m, _DISAGREE)
-    return _titled(image, evidence.title)
+    return titled(image, evidence.title)
 
 
 def _corners(prepared: PreparedMap) -> Points:
@@ -180,15 +174,3 @@ def _dots(image: Rgb, points_m: Points, low: Points, pixel_m: float, colour: Col
     row, col = rows - 1 - pixel[:, 1], pixel[:, 0]
     for down, right in ((0, 0), (1, 0), (0, 1), (1, 1)):
         image[np.clip(row + down, 0, rows - 1), np.clip(col + right, 0, cols - 1)] = colour
-
-
-def _titled(image: Rgb, title: str) -> Rgb:
-    """Return the picture below a strip with its title, which is as large as fits."""
-    size = min(0.6, image.shape[1] / (len(title) * 16))
-    strip = np.full((max(1, round(_BANNER_PX * size / 0.6)), image.shape[1], 3), 255, np.uint8)
-    _text(strip, title, (8, int(24 * size / 0.6)), size)
-    return np.vstack([strip, image])
-
-
-def _text(image: Rgb, text: str, at: tuple[int, int], size: float, colour: Colour = _INK) -> None:
-    cv2.putText(image, text, at, _FONT, size, colour, 1, cv2.LINE_AA)

@@ -109,9 +109,17 @@ def agreement(target: PreparedMap, source: PreparedMap, poses: Poses, ahead: Pro
     )
 
 
+def tally_at(prepared: PreparedMap, x_m: NDArray[np.float32], y_m: NDArray[np.float32], wall_m: float) -> Tally:
+    """Return what walls at places in the map's grid frame, shape (N,), meet there, each for so much wall."""
+    return _tally(_looked_up(prepared, x_m[None], y_m[None]), wall_m)
+
+
 def _met(prepared: PreparedMap, poses: Poses, points_m: Points) -> NDArray[np.uint8]:
     """Return `PreparedMap.meets` at points placed on the map, shape (C, N)."""
-    x, y = placed(poses, points_m)
+    return _looked_up(prepared, *placed(poses, points_m))
+
+
+def _looked_up(prepared: PreparedMap, x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.uint8]:
     rows, cols = prepared.meets.shape
     inverse, margin = np.float32(1.0 / prepared.resolution_m), np.float32(prepared.margin)
     col = np.clip(x * inverse + margin, 0, cols - 1).astype(np.int32)

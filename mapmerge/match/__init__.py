@@ -12,6 +12,8 @@ __all__ = ["MATCHERS", "Match", "Matcher", "Rival", "load_matcher"]
 
 MATCHERS: dict[str, str] = {
     "correlation": "mapmerge.match.correlation:CorrelationMatcher",
+    "existing": "mapmerge.match.existing:ExistingMatcher",
+    "paper": "mapmerge.match.paper:PaperMatcher",
 }
 
 

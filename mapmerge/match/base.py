@@ -51,6 +51,9 @@ class Match:
         Calibrated probability that the placement is right; None where the method states none.
     cues
         The figures that the confidence was computed from.
+    weight
+        How far the match is trusted against those of other pairs, where the method has a measure of its own; None:
+        by its score.
     rivals
         Distinct placements of the same pair, best first.
     evidence
@@ -63,8 +66,16 @@ class Match:
     reason: Reason
     confidence: float | None = None
     cues: Cues | None = None
+    weight: float | None = None
     rivals: tuple[Rival, ...] = ()
     evidence: tuple[Evidence, ...] = ()
+
+    @property
+    def trust(self) -> float:
+        """What the placement of all robots weighs this match by."""
+        if self.weight is not None:
+            return self.weight
+        return self.scores.score_m if self.scores is not None else 0.0
 
 
 class Matcher(Protocol[PreparedT]):

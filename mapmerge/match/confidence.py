@@ -8,7 +8,7 @@ says more for the placement, and that is flat beyond what was seen in fitting. `
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
 
 from mapmerge.match.calibration import CURVES, INTERCEPT
@@ -40,12 +40,12 @@ class Curve:
         return total
 
 
-_CURVES = tuple(Curve(knots, rises) for knots, rises in CURVES.values())
+_CURVES = {cue: Curve(knots, rises) for cue, (knots, rises) in CURVES.items()}
 
 
 def confidence(cues: Cues) -> float:
     """Return the calibrated probability that a placement with these cues is right."""
-    log_odds = INTERCEPT + sum(curve.at(value) for curve, value in zip(_CURVES, astuple(cues), strict=True))
+    log_odds = INTERCEPT + sum(curve.at(getattr(cues, cue)) for cue, curve in _CURVES.items())
     # of two placements that are as good only one is right, which no sum of other cues may outweigh
     as_good = min(1.0, max(0.0, (cues.likeness - _ALIKE) / (_AS_GOOD - _ALIKE)))
     return 1.0 / (1.0 + math.exp(-log_odds)) / (1.0 + as_good)

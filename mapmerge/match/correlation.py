@@ -84,7 +84,7 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
     if found is None:
         reason = Reason(ReasonCode.NO_CANDIDATE, "no placement lets walls of the two maps coincide")
         return Match(None, None, accepted=False, reason=reason, evidence=(_spectra(pair, rotations),))
-    cues = cues_of(pair, found.best, found.scores, found.rivals, config.verify)
+    cues = cues_of(pair, found.best, found.scores, found.rivals, config)
     sure = confidence(cues)
     reason = judge(found.scores, cues, sure, config.verify)
     return Match(

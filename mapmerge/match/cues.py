@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmerge.align import Poses, placed, poses_of
-from mapmerge.config import VerifyConfig
+from mapmerge.config import MergeConfig, VerifyConfig
 from mapmerge.match.look import Look
 from mapmerge.match.pair import PairOfMaps
+from mapmerge.match.slack import slack
 from mapmerge.prepare import PreparedMap
 from mapmerge.score import agreement, probe
 from mapmerge.sim2 import Sim2
@@ -29,6 +30,10 @@ class Cues:
         Share of the walls that agree, in the worse and in the better direction.
     far_share
         Share of the walls that stand amid the other map's free space, far from its walls.
+    slack_agreement
+        Share of the walls that agree, in the worse direction, if the maps may bend a little.
+    bend_m
+        By how much they bend for that.
     likeness
         Score of the best distinct rival over that of the placement, 0 to 1.
     lead_m
@@ -51,6 +56,8 @@ class Cues:
     wall_agreement: float
     other_wall_agreement: float
     far_share: float
+    slack_agreement: float
+    bend_m: float
     likeness: float
     lead_m: float
     rival_agreement: float
@@ -62,7 +69,7 @@ class Cues:
     tight_share: float
 
 
-def cues_of(pair: PairOfMaps, target_from_source: Sim2, scores: Scores, rivals: Look, config: VerifyConfig) -> Cues:
+def cues_of(pair: PairOfMaps, target_from_source: Sim2, scores: Scores, rivals: Look, config: MergeConfig) -> Cues:
     """Return the cues of a placement between the grid frames."""
     target, source = pair.target.map, pair.source.map
     pose = poses_of([target_from_source])
@@ -71,13 +78,16 @@ def cues_of(pair: PairOfMaps, target_from_source: Sim2, scores: Scores, rivals: 
     judged_m = sum(float(tally.matched_m[0] + tally.violated_m[0]) for tally in (found.ahead, found.back))
     far_m = float(found.ahead.far_m[0] + found.back.far_m[0])
     rival_m = max(0.0, float(rivals.scores_m[0])) if len(rivals.scores_m) else 0.0
-    substantial = rivals.matched_m >= config.min_matched_wall_m
-    aligned, held_m, tight_share = _fit(target, source, pose, config)
+    substantial = rivals.matched_m >= config.verify.min_matched_wall_m
+    aligned, held_m, tight_share = _fit(target, source, pose, config.verify)
+    bent = slack(target, source, target_from_source, config.slack)
     return Cues(
         matched_wall_m=scores.matched_wall_m,
         wall_agreement=scores.wall_agreement,
         other_wall_agreement=float(max(found.ahead.share[0], found.back.share[0])),
         far_share=far_m / judged_m if judged_m > 0 else 0.0,
+        slack_agreement=bent.share,
+        bend_m=bent.bend_m,
         likeness=min(1.0, rival_m / scores.score_m) if scores.score_m > 0 else 1.0,
         lead_m=max(0.0, scores.score_m - rival_m),
         rival_agreement=float(rivals.shares[substantial].max(initial=0.0)),
@@ -95,7 +105,7 @@ def _fit(target: PreparedMap, source: PreparedMap, pose: Poses, config: VerifyCo
     tolerance_m = max(config.tolerance_m, target.resolution_m)
     x, y = (values[0] for values in placed(pose, source.walls_m))
     wall = target.nearest.wall_at(x, y)
-    away_m = np.hypot(target.walls_m[wall, 0] - x, target.walls_m[wall, 1] - y)
+    away_m = target.nearest.distance_m(target.walls_m, x, y)
     met = away_m <= tolerance_m
     if not met.any():
         return 0.0, 0.0, 0.0

@@ -1,7 +1,7 @@
 """What every matcher does, whatever its method: right or refused, and always explained."""
 
 import math
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 
 import numpy as np
 import pytest
@@ -34,7 +34,32 @@ from tests.floors import (
     within,
 )
 
-POSITION_M, ANGLE_DEG = 0.1, 0.5
+
+@dataclass(frozen=True)
+class Promise:
+    """What a method promises, beyond what all of them do.
+
+    Parameters
+    ----------
+    position_m, angle_deg
+        Errors of what it accepts stay below these.
+    finds
+        Whether it finds the placements of these tests; else it may refuse them, but not get them wrong.
+    omega_alone
+        Whether it accepts on the acceptance index alone, whatever else speaks against a placement.
+    """
+
+    position_m: float = 0.1
+    angle_deg: float = 0.5
+    finds: bool = True
+    omega_alone: bool = False
+
+
+PROMISES = {
+    "correlation": Promise(),
+    "paper": Promise(angle_deg=1.0, omega_alone=True),  # ICP on centres of cells ends within a cell
+    "existing": Promise(position_m=0.25, angle_deg=2.0, finds=False, omega_alone=True),  # no ICP
+}
 OF_A_PAIR = {
     ReasonCode.ACCEPTED,
     ReasonCode.TOO_LITTLE_STRUCTURE,
@@ -49,8 +74,18 @@ OF_A_PAIR = {
 
 
 @pytest.fixture(params=sorted(MATCHERS), scope="module")
-def matcher(request):
-    return load_matcher(request.param)
+def method(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def matcher(method):
+    return load_matcher(method)
+
+
+@pytest.fixture(scope="module")
+def promise(method):
+    return PROMISES[method]
 
 
 def checked(match: Match) -> Match:
@@ -87,15 +122,24 @@ def matched(matcher, target, source):
     return checked(match_grids(matcher, target, source))
 
 
-def assert_right(match, pair):
-    assert match.accepted, match.reason
-    position_m, angle_deg = pair.errors(match.target_from_source)
-    assert position_m < POSITION_M
-    assert angle_deg < ANGLE_DEG
+def assert_right(match, pair, promise):
+    if match.accepted or promise.finds:
+        assert match.accepted, match.reason
+        position_m, angle_deg = pair.errors(match.target_from_source)
+        assert position_m < promise.position_m
+        assert angle_deg < promise.angle_deg
 
 
 def assert_refused(match):
     assert not match.accepted, (match.reason, match.target_from_source)
+
+
+def assert_refused_by_more_than_omega(match, promise):
+    """The maps agree at a placement that is not to be trusted: a method that goes by ω alone cannot tell."""
+    if promise.omega_alone and match.scores is not None:
+        assert match.accepted == (match.scores.acceptance >= CONFIG.verify.min_acceptance)
+    else:
+        assert_refused(match)
 
 
 def alike(one, other):
@@ -113,26 +157,26 @@ def alike(one, other):
 
 class TestRight:
     @pytest.mark.parametrize("seed", range(4))
-    def test_a_known_placement_is_found(self, matcher, seed):
+    def test_a_known_placement_is_found(self, matcher, promise, seed):
         pair = office_pair(seed)
-        assert_right(matched(matcher, pair.target, pair.source), pair)
+        assert_right(matched(matcher, pair.target, pair.source), pair, promise)
 
     @pytest.mark.parametrize("turn_rad", [0.0, 0.35, math.pi / 2, 2.2, math.pi, -2.9, -math.pi / 2, -0.8])
-    def test_at_any_turn(self, matcher, turn_rad):
+    def test_at_any_turn(self, matcher, promise, turn_rad):
         walls = {"inside": within(0.0, 0.0, *FLAT_M), "walls": FLAT_WALLS}
         corner = Sim2(*FLAT_M, turn_rad) @ Sim2(-11.0, -9.0)
         target = drawn(**walls, size_m=(13.0, 10.0), floor_from_map=Sim2(-2.03, -2.01), ragged=1)
         source = drawn(**walls, size_m=(16.0, 16.0), floor_from_map=corner, ragged=2)
         pair = Pair(target, source, Sim2(-2.03, -2.01).inverse() @ corner)
-        assert_right(matched(matcher, target, source), pair)
+        assert_right(matched(matcher, target, source), pair, promise)
 
     @pytest.mark.parametrize("resolutions_m", [(0.05, 0.08), (0.08, 0.05), (0.1, 0.05), (0.05, 0.03)])
-    def test_at_different_resolutions(self, matcher, resolutions_m):
+    def test_at_different_resolutions(self, matcher, promise, resolutions_m):
         pair = office_pair(1, resolutions_m=resolutions_m)
-        assert_right(matched(matcher, pair.target, pair.source), pair)
+        assert_right(matched(matcher, pair.target, pair.source), pair, promise)
 
     @pytest.mark.parametrize("frames", [(Sim2(30.0, -8.0, 0.7), IDENTITY), (IDENTITY, Sim2(-3.0, 900.0, -2.2))])
-    def test_with_a_turned_origin(self, matcher, frames):
+    def test_with_a_turned_origin(self, matcher, promise, frames):
         pair = office_pair(2)
         moved = Pair(
             in_frame(pair.target, frames[0]),
@@ -140,29 +184,31 @@ class TestRight:
             frames[0] @ pair.target_from_source @ frames[1].inverse(),
         )
         match = matched(matcher, moved.target, moved.source)
-        assert_right(match, moved)
+        assert_right(match, moved, promise)
         still = match_grids(matcher, pair.target, pair.source).target_from_source
         expected = frames[0] @ still @ frames[1].inverse()
         assert errors(match.target_from_source, expected, moved.shared_m) == pytest.approx((0.0, 0.0), abs=1e-6)
 
     @pytest.mark.parametrize("seed", [0, 3])
-    def test_swapping_the_maps_gives_the_inverse(self, matcher, seed):
+    def test_swapping_the_maps_gives_the_inverse(self, matcher, promise, seed):
         pair = office_pair(seed)
         there = matched(matcher, pair.target, pair.source)
         back = matched(matcher, pair.source, pair.target)
-        assert there.accepted
-        assert back.accepted
+        assert_right(there, pair, promise)
+        assert_right(back, pair.swapped, promise)
+        if not promise.finds:
+            return
         position_m, angle_deg = errors(back.target_from_source.inverse(), there.target_from_source, pair.shared_m)
-        assert position_m < POSITION_M
-        assert angle_deg < ANGLE_DEG
+        assert position_m < promise.position_m
+        assert angle_deg < promise.angle_deg
         assert back.scores.wall_agreement == pytest.approx(there.scores.wall_agreement, abs=0.05)
         assert back.scores.overlap_m2 == pytest.approx(there.scores.overlap_m2, rel=0.05)
 
-    def test_unknown_margins_do_not_matter(self, matcher):
+    def test_unknown_margins_do_not_matter(self, matcher, promise):
         pair = office_pair(3)
         margin = np.pad(pair.source.cells, ((37, 5), (11, 53)), constant_values=-1)
         source = Grid(margin, 0.05, pair.source.map_from_grid @ Sim2(-11 * 0.05, -37 * 0.05))
-        assert_right(matched(matcher, pair.target, source), pair)
+        assert_right(matched(matcher, pair.target, source), pair, promise)
 
     def test_figures_are_those_of_the_truth(self, matcher):
         pair = office_pair(1)
@@ -248,12 +294,12 @@ class TestRefused:
         assert_refused(matched(matcher, last_map(target), last_map(source)))
 
     @pytest.mark.parametrize("seed", [1, 4])
-    def test_maps_of_one_floor_that_do_not_meet(self, matcher, seed):
+    def test_maps_of_one_floor_that_do_not_meet(self, matcher, promise, seed):
         target, source = office_run(seed, 0.0, 0.25, 0.4, 1), office_run(seed, 1.0, 0.75, 1.9, 2)
         pair = pair_of(target, source)
         match = matched(matcher, pair.target, pair.source)
         if match.accepted:
-            assert_right(match, pair)
+            assert_right(match, pair, promise)
 
     @pytest.mark.parametrize("axis", [0, 1])
     def test_a_mirrored_copy(self, matcher, axis):
@@ -262,7 +308,7 @@ class TestRefused:
             assert_refused(matched(matcher, grid, mirrored))
 
     @pytest.mark.parametrize("size_m", [(6.0, 6.0), (8.0, 5.0)])
-    def test_a_room_that_looks_the_same_from_the_other_side(self, matcher, size_m):
+    def test_a_room_that_looks_the_same_from_the_other_side(self, matcher, promise, size_m):
         corner = Sim2(-0.5, -0.5)
         rooms = [
             drawn(
@@ -275,13 +321,14 @@ class TestRefused:
             for seed in (1, 2)
         ]
         match = matched(matcher, *rooms)
-        assert_refused(match)
-        assert match.reason.code is ReasonCode.AMBIGUOUS
-        assert match.rivals
+        assert_refused_by_more_than_omega(match, promise)
+        if not promise.omega_alone:
+            assert match.reason.code is ReasonCode.AMBIGUOUS
+            assert match.rivals
 
     @pytest.mark.parametrize("name", LONG_WALLS)
     @pytest.mark.parametrize("lengths_m", [(12.0, 12.0), (12.0, 20.0), (24.0, 23.0)])
-    def test_walls_without_an_end(self, matcher, name, lengths_m):
+    def test_walls_without_an_end(self, matcher, promise, name, lengths_m):
         """Nothing tells how far the maps are shifted along the walls, though some shift scores highest."""
         maps = [
             drawn(
@@ -293,12 +340,14 @@ class TestRefused:
             )
             for seed, length_m in enumerate(lengths_m)
         ]
-        assert_refused(matched(matcher, *maps))
+        assert_refused_by_more_than_omega(matched(matcher, *maps), promise)
 
     @pytest.mark.parametrize(("target_bays", "source_bays"), BAYS)
-    def test_a_corridor_that_looks_alike_is_not_placed_a_bay_off(self, matcher, target_bays, source_bays):
+    def test_a_corridor_that_looks_alike_is_not_placed_a_bay_off(self, matcher, promise, target_bays, source_bays):
         pair = pair_of(corridor_run(*target_bays, 0.3, 1), corridor_run(*source_bays, 1.1, 2))
         match = matched(matcher, pair.target, pair.source)
+        if promise.omega_alone:
+            return
         assert match.target_from_source is not None
         position_m, angle_deg = pair.errors(match.target_from_source)
         # seen from the other side, its bays look the same as well
@@ -311,6 +360,6 @@ class TestRefused:
         assert_refused(matched(matcher, map_of_a_flat, nearly_nothing))
 
     @pytest.mark.parametrize("name", sorted(set(NEARLY_NOTHING) - {"noise"}))
-    def test_maps_with_nothing_to_go_by_and_their_copies(self, matcher, name):
+    def test_maps_with_nothing_to_go_by_and_their_copies(self, matcher, promise, name):
         nearly_nothing = NEARLY_NOTHING[name]
-        assert_refused(matched(matcher, nearly_nothing, nearly_nothing))
+        assert_refused_by_more_than_omega(matched(matcher, nearly_nothing, nearly_nothing), promise)

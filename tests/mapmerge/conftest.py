@@ -28,10 +28,11 @@ class ScriptedMatcher:
     def map_of(self, value, resolution_m=0.05):
         return Grid(np.full((20, 20), value, np.int8), resolution_m)
 
-    def fits(self, target, source, pose=IDENTITY, score_m=50.0, confidence=None):
+    def fits(self, target, source, pose=IDENTITY, score_m=50.0, confidence=None, weight=None):
         """From now on, the map filled with ``source`` lies at ``pose`` on that filled with ``target``."""
         reason = Reason(ReasonCode.ACCEPTED, f"{source} fits {target}")
-        self.answers[target, source] = Match(pose, self.scores(score_m), True, reason, confidence)
+        scores = self.scores(score_m)
+        self.answers[target, source] = Match(pose, scores, True, reason, confidence, weight=weight)
 
     def misfits(self, target, source, score_m=5.0, code=ReasonCode.WALLS_DISAGREE):
         reason = Reason(code, f"{source} does not fit {target}")

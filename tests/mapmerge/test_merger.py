@@ -336,6 +336,15 @@ class TestLoops:
         assert match.target_from_source == Sim2(5.0)
         assert [outcome.merged_from_map.x_m for outcome in result.robots.values()] == [0.0, 1.0, 2.0]
 
+    def test_a_method_may_weigh_its_matches_by_a_measure_of_its_own(self, session, scripted):
+        """The pair of largest score is the weakest of the loop by that measure."""
+        scripted.fits(ONE, TWO, Sim2(1.0), 50.0, weight=0.98)
+        scripted.fits(ONE, THREE, Sim2(2.0), 60.0, weight=0.97)
+        scripted.fits(TWO, THREE, Sim2(5.0), 90.0, weight=0.96)
+        result = session.step(r1=ONE, r2=TWO, r3=THREE)
+        assert result.pairs["r2", "r3"].reason.code is ReasonCode.INCONSISTENT
+        assert [outcome.merged_from_map.x_m for outcome in result.robots.values()] == [0.0, 1.0, 2.0]
+
     def test_it_counts_again_once_nothing_contradicts_it(self, contradicting):
         """The reference starts anew: r2 and r3 still fit each other, and nothing speaks against it any more."""
         contradicting.step(r1=ONE, r2=TWO, r3=THREE)

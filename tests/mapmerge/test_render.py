@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from mapmerge.evidence import Curve, CurvesEvidence, OverlayEvidence, SurfaceEvidence
+from mapmerge.evidence import (
+    Curve,
+    CurvesEvidence,
+    ImagesEvidence,
+    MarkedImage,
+    OverlayEvidence,
+    SurfaceEvidence,
+)
 from mapmerge.grid import Grid
 from mapmerge.render import MAX_SIDE_PX, render
 from mapmerge.sim2 import IDENTITY, Sim2
@@ -26,6 +33,16 @@ def overlay(target, source, pose=IDENTITY):
     return OverlayEvidence("overlay", "Two maps", prepared_map(target), prepared_map(source), pose, 0.15)
 
 
+def images(target, source, pairs=()):
+    """Two pictures of these shapes, with a mark in the middle and one in the first cell."""
+    both = []
+    for label, shape in (("target", target), ("source", source)):
+        middle = [shape[1] // 2, shape[0] // 2]
+        marks = np.array([middle, [0, 0]], float) if min(shape) else np.empty((0, 2))
+        both.append(MarkedImage(label, np.zeros(shape, np.uint8), marks))
+    return ImagesEvidence("images", "Two pictures", *both, np.array(pairs, np.intp).reshape(-1, 2))
+
+
 CASES = {
     "three curves": curves(RAMP, RAMP**2, -RAMP),
     "one flat curve": curves(np.zeros(180), marks=()),
@@ -41,6 +58,10 @@ CASES = {
     "without a wall": overlay(flat(), filled(0, 50, 40)),
     "nothing known": overlay(filled(-1, 5, 5), filled(0, 0, 0)),
     "one cell": overlay(filled(100, 1, 1), filled(100, 1, 1)),
+    "two images": images((200, 300), (120, 90), [(0, 0), (1, 1)]),
+    "images of one cell": images((1, 1), (1, 1), [(0, 0)]),
+    "large images": images((3000, 50), (20, 4000), [(0, 1)]),
+    "images of nothing": images((0, 0), (0, 9)),
     "long and thin": overlay(filled(100, 1, 4000), filled(100, 1, 4000)),
 }
 
@@ -97,3 +118,18 @@ def test_the_chosen_shift_is_marked_where_it_is():
     title_rows = picture.rgb.shape[0] - picture.rgb.shape[1]
     assert cols.mean() == pytest.approx(70.5 * zoom, abs=2)
     assert rows.mean() == pytest.approx(title_rows + (99.5 - 20) * zoom, abs=2)
+
+
+def test_marks_are_where_they_are_and_pairs_are_joined():
+    """The first cell, which has the lowest y, is at the lower left of each picture."""
+    rgb = render(images((100, 100), (100, 100), [(1, 1)])).rgb
+    rows, cols = np.nonzero(rgb[:, :, 1].astype(int) - rgb[:, :, 0] > 60)
+    assert cols.min() < 20
+    assert cols.max() - cols.min() == pytest.approx(rgb.shape[1] / 2, abs=12)
+    assert rows.min() > rgb.shape[0] - 20
+
+
+def test_flat_images_are_shown_above_each_other():
+    above, beside = render(images((100, 400), (100, 400))).rgb, render(images((400, 100), (400, 100))).rgb
+    assert above.shape[1] > 0.9 * MAX_SIDE_PX
+    assert beside.shape[0] > 0.9 * MAX_SIDE_PX

@@ -1,0 +1,131 @@
+"""How well two maps agree if they may bend a little: drift bends maps, so that no rigid placement fits all of one.
+
+A smooth field of shifts is found for one placement, which moves the source's walls on the target's: a non-rigid ICP
+along the walls' normals. Drift bends a map by decimetres over many metres, which the field follows; walls that one of
+two look-alike places lacks are not mended by it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapmerge.align import placed, poses_of
+from mapmerge.config import SlackConfig
+from mapmerge.prepare import PreparedMap
+from mapmerge.score import Tally, tally_at
+from mapmerge.sim2 import Sim2
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slack:
+    """Agreement of two maps that may bend.
+
+    Parameters
+    ----------
+    ahead, back
+        What the walls of the source, and of the target, meet once they are shifted.
+    bend_m
+        Root mean square of the shifts where walls agree.
+    """
+
+    ahead: Tally
+    back: Tally
+    bend_m: float
+
+    @property
+    def share(self) -> float:
+        """Share of the walls that agree, in the worse direction."""
+        return float(min(self.ahead.share[0], self.back.share[0]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Field:
+    """Shifts in the target's grid frame, one for each square."""
+
+    x_m: Floats
+    y_m: Floats
+    corner_m: tuple[float, float]
+    cell_m: float
+
+    def index(self, x_m: Floats, y_m: Floats) -> NDArray[np.intp]:
+        rows, cols = self.x_m.shape
+        col = np.clip(((x_m - self.corner_m[0]) / self.cell_m).astype(np.intp), 0, cols - 1)
+        row = np.clip(((y_m - self.corner_m[1]) / self.cell_m).astype(np.intp), 0, rows - 1)
+        return np.asarray(row * cols + col, np.intp)
+
+    def at(self, x_m: Floats, y_m: Floats) -> tuple[Floats, Floats]:
+        index = self.index(x_m, y_m)
+        return self.x_m.ravel()[index], self.y_m.ravel()[index]
+
+
+def slack(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, config: SlackConfig) -> Slack:
+    """Return how well two maps agree at a placement between their grid frames if both may bend a little."""
+    pose = poses_of([target_from_source])
+    x, y = (values[0] for values in placed(pose, source.walls_m))
+    field = _bent(target, x, y, config)
+    shift_x, shift_y = field.at(x, y)
+    ahead = tally_at(target, x + shift_x, y + shift_y, source.wall_spacing_m * target_from_source.scale)
+    wall_x, wall_y = target.walls_m.astype(np.float32).T
+    back_x, back_y = field.at(wall_x, wall_y)
+    unbent = np.stack([wall_x - back_x, wall_y - back_y], axis=1).astype(np.float64)
+    in_source = target_from_source.inverse().apply(unbent).astype(np.float32)
+    back = tally_at(source, in_source[:, 0], in_source[:, 1], target.wall_spacing_m)
+    met = target.nearest.distance_m(target.walls_m, x + shift_x, y + shift_y) <= 2 * source.wall_spacing_m
+    square = np.square(shift_x[met]) + np.square(shift_y[met])
+    return Slack(ahead, back, float(np.sqrt(square.mean())) if met.any() else 0.0)
+
+
+def _bent(target: PreparedMap, x: Floats, y: Floats, config: SlackConfig) -> _Field:
+    """Return the smooth field of shifts that brings walls at these places on the target's."""
+    corner = float(x.min()), float(y.min())
+    cols = int((float(x.max()) - corner[0]) / config.cell_m) + 1
+    rows = int((float(y.max()) - corner[1]) / config.cell_m) + 1
+    still = np.zeros((rows, cols), np.float32)
+    field = _Field(still, still, corner, config.cell_m)
+    index = field.index(x, y)
+    walls = target.walls_m.astype(np.float32)
+    for reach_m in config.reject_m:
+        shift_x, shift_y = field.at(x, y)
+        at_x, at_y = x + shift_x, y + shift_y
+        wall = target.nearest.wall_at(at_x, at_y)
+        error_x, error_y = walls[wall, 0] - at_x, walls[wall, 1] - at_y
+        square = np.square(error_x) + np.square(error_y)
+        weight = np.where(square <= reach_m**2, 1.0 / (1.0 + square / (0.35 * reach_m) ** 2), 0.0)
+        # of a straight wall only the shift across it is known: n nᵀ for its normal n
+        cos, sin = target.directions[wall].T
+        xx, xy, yy = 0.5 * weight * (1.0 - cos), -0.5 * weight * sin, 0.5 * weight * (1.0 + cos)
+        sums = [
+            _spread(np.bincount(index, values, rows * cols).reshape(rows, cols).astype(np.float32), config)
+            for values in (xx, xy, yy, xx * error_x + xy * error_y, xy * error_x + yy * error_y)
+        ]
+        step_x, step_y = _solved(sums, config.stiffness)
+        field = _limited(field, step_x, step_y, config.most_m)
+    return field
+
+
+def _spread(values: Floats, config: SlackConfig) -> Floats:
+    """Return sums over the squares around each, near ones counting more."""
+    sigma = config.length_m / config.cell_m
+    blurred = cv2.GaussianBlur(values, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT)
+    return np.asarray(blurred * np.float32(2 * np.pi * sigma**2), np.float32)
+
+
+def _solved(sums: list[Floats], stiffness: float) -> tuple[Floats, Floats]:
+    """Solve the normal equations of each square, with a spring that draws it to no shift."""
+    xx, xy, yy, right_x, right_y = sums
+    xx, yy = xx + np.float32(stiffness), yy + np.float32(stiffness)
+    determinant = xx * yy - xy * xy
+    step_x, step_y = (yy * right_x - xy * right_y) / determinant, (xx * right_y - xy * right_x) / determinant
+    return step_x.astype(np.float32), step_y.astype(np.float32)
+
+
+def _limited(field: _Field, step_x: Floats, step_y: Floats, most_m: float) -> _Field:
+    x, y = field.x_m + step_x, field.y_m + step_y
+    factor = np.minimum(1.0, most_m / np.maximum(np.hypot(x, y), 1e-9)).astype(np.float32)
+    return _Field(x * factor, y * factor, field.corner_m, field.cell_m)
