@@ -234,7 +234,7 @@ HALL_WALLS = [
 
 
 def hall_and_part(corner_m: tuple[float, float], yaw_rad: float) -> tuple[Grid, Grid, Sim2]:
-    """Return a hall of 60 × 40 m, a part of 13 × 11 m of it mapped in another frame, and where that lies in the hall."""
+    """Return a hall of 60 × 40 m, a part of 13 × 11 m of it in another frame, and where that lies in the hall."""
     x_m, y_m = corner_m
     hall_from_part = Sim2(x_m + 6.5, y_m + 5.5, yaw_rad) @ Sim2(-9.0, -9.0)
     hall = drawn(within(0.0, 0.0, 60.0, 40.0), HALL_WALLS, size_m=(61.0, 41.0), floor_from_map=Sim2(-0.5, -0.5))

@@ -14,6 +14,8 @@ from itertools import pairwise
 from mapmerge.match.calibration import CURVES, INTERCEPT
 from mapmerge.match.cues import Cues
 
+_ALIKE, _AS_GOOD = 0.85, 0.98
+
 
 @dataclass(frozen=True, slots=True)
 class Curve:
@@ -44,4 +46,6 @@ _CURVES = {cue: Curve(knots, rises) for cue, (knots, rises) in CURVES.items()}
 def confidence(cues: Cues) -> float:
     """Return the calibrated probability that a placement with these cues is right."""
     log_odds = INTERCEPT + sum(curve.at(getattr(cues, cue)) for cue, curve in _CURVES.items())
-    return 1.0 / (1.0 + math.exp(-log_odds))
+    # of two placements that are as good only one is right, which no sum of other cues may outweigh
+    as_good = min(1.0, max(0.0, (cues.likeness - _ALIKE) / (_AS_GOOD - _ALIKE)))
+    return 1.0 / (1.0 + math.exp(-log_odds)) / (1.0 + as_good)

@@ -8,6 +8,7 @@ import pytest
 
 from mapmerge.grid import Grid
 from mapmerge.match import MATCHERS, Match, load_matcher
+from mapmerge.prior import Prior
 from mapmerge.reasons import ReasonCode
 from mapmerge.render import MAX_SIDE_PX, render
 from mapmerge.sim2 import IDENTITY, Sim2
@@ -94,6 +95,8 @@ def checked(match: Match) -> Match:
     assert len(match.reason.message.split()) >= 4
     assert not {"nan", "inf", "None"} & set(match.reason.message.replace(",", " ").split())
     assert (match.target_from_source is None) == (match.scores is None)
+    assert match.confidence is None or 0.0 <= match.confidence <= 1.0
+    assert all(math.isfinite(rival.score_m) for rival in match.rivals)
     if match.scores is not None:
         assert all(math.isfinite(getattr(match.scores, field.name)) for field in fields(match.scores))
         assert 0.0 <= match.scores.acceptance <= 1.0
@@ -103,6 +106,8 @@ def checked(match: Match) -> Match:
         assert match.target_from_source is not None
         assert match.evidence
     rivals = [rival.score_m for rival in match.rivals]
+    if match.reason.code is ReasonCode.PRIOR_CONTRADICTED:
+        rivals = rivals[1:]
     assert rivals == sorted(rivals, reverse=True)
     assert len({evidence.step for evidence in match.evidence}) == len(match.evidence)
     for evidence in match.evidence:
@@ -215,6 +220,33 @@ class TestRight:
         assert scores.overlap_fraction == pytest.approx(both_m2 / smaller_m2, rel=0.05)
 
 
+def believed(pose, sigma_m=0.3, sigma_rad=0.06):
+    return Prior(pose, sigma_m, sigma_m, sigma_rad, "given for r2")
+
+
+class TestPrior:
+    @pytest.mark.parametrize("off", [Sim2(), Sim2(0.6, -0.5, 0.1), Sim2(-0.4, -0.7, -0.15)])
+    def test_a_placement_within_it_is_found(self, matcher, off):
+        pair = office_pair(2)
+        true = pair.target_from_source
+        prior = believed(Sim2(true.x_m + off.x_m, true.y_m + off.y_m, true.yaw_rad + off.yaw_rad))
+        match = checked(match_grids(matcher, pair.target, pair.source, prior=prior))
+        assert_right(match, pair)
+        assert prior.allows(match.target_from_source)
+
+    @pytest.mark.parametrize("off", [Sim2(4.0, 0.0), Sim2(0.0, -1.5), Sim2(0.0, 0.0, 2.5)])
+    def test_none_without_it_is_accepted(self, matcher, off):
+        pair = office_pair(2)
+        true = pair.target_from_source
+        prior = believed(Sim2(true.x_m + off.x_m, true.y_m + off.y_m, true.yaw_rad + off.yaw_rad))
+        match = checked(match_grids(matcher, pair.target, pair.source, prior=prior))
+        assert_refused(match)
+        assert match.reason.code is ReasonCode.PRIOR_CONTRADICTED
+        position_m, angle_deg = pair.errors(match.rivals[0].target_from_source)
+        assert position_m < POSITION_M
+        assert angle_deg < ANGLE_DEG
+
+
 class TestRepeats:
     @pytest.mark.parametrize("seeds", [(1, 1), (1, 2)])
     def test_the_same_maps_have_the_same_outcome_in_every_field(self, matcher, seeds):
@@ -317,8 +349,9 @@ class TestRefused:
         if promise.omega_alone:
             return
         assert match.target_from_source is not None
-        position_m, _ = pair.errors(match.target_from_source)
-        assert not match.accepted or position_m < 0.25 * BAY_M
+        position_m, angle_deg = pair.errors(match.target_from_source)
+        # seen from the other side, its bays look the same as well
+        assert not match.accepted or (position_m < 0.25 * BAY_M and angle_deg < 5.0), match.cues
 
     @pytest.mark.parametrize("name", NEARLY_NOTHING)
     def test_maps_with_nothing_to_go_by(self, matcher, name):

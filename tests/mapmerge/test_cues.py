@@ -1,7 +1,7 @@
 """What speaks for and against a placement, and the confidence that follows."""
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -22,14 +22,15 @@ SHARES = ("wall_agreement", "other_wall_agreement", "far_share", "likeness", "ri
 def against(*scores_m, share=0.5, matched_m=20.0):
     """Return rivals, best first."""
     count = len(scores_m)
-    return Look(poses_of([Sim2(9.0)] * count), np.array(scores_m), np.full(count, matched_m), np.full(count, share))
+    figures = (np.full(count, value) for value in (matched_m, share, 30.0))
+    return Look(poses_of([Sim2(9.0)] * count), np.array(scores_m), *figures)
 
 
 def cues(pair, place=None, rivals=None):
     """Return the cues of a placement between the grids: by default the one that lays the map frames on each other."""
     placement = pair.between_grids(Sim2()) if place is None else place
     scores = verify(pair.target.map, pair.source.map, placement, CONFIG.verify)
-    return cues_of(pair, placement, scores, against() if rivals is None else rivals, CONFIG.verify)
+    return cues_of(pair, placement, scores, against() if rivals is None else rivals, CONFIG)
 
 
 FLATS = pair_of_maps(flat(ragged=1), flat(ragged=2))
@@ -113,3 +114,9 @@ def test_maps_without_much_on_them_have_cues_and_a_confidence(one, other, place)
     assert all(math.isfinite(getattr(found, field.name)) for field in fields(Cues))
     assert all(0.0 <= getattr(found, name) <= 1.0 for name in SHARES)
     assert 0.0 <= confidence(found) <= 1.0
+
+
+def test_a_rival_that_is_as_good_leaves_an_even_chance():
+    """However much wall agrees, such as at a corridor whose rooms nobody can tell apart."""
+    alone = cues(FLATS)
+    assert confidence(replace(alone, likeness=1.0, lead_m=0.0, rival_agreement=1.0)) <= 0.5

@@ -94,15 +94,18 @@ class TestDistinct:
         assert self.kept() == []
 
 
+def judged(poses, *scores_m):
+    """Return placements with these scores, and figures of no matter."""
+    others = np.ones((3, len(scores_m)))
+    return Look(poses_of(poses), np.array(scores_m), *others)
+
+
 class TestRivals:
     def test_are_apart_from_the_best_and_from_each_other(self):
-        poses = poses_of([off(0.1, 0.0), off(2.0, 0.0), off(2.2, 0.0), off(0.0, 3.0)])
-        others = Look(poses, np.array([9.0, 8.0, 7.0, 6.0]), np.ones(4), np.ones(4))
-        best = Look(poses_of([TRUTH]), np.array([10.0]), np.ones(1), np.ones(1))
-        assert rivals(best, others, PAIR, CONFIG.verify).scores_m.tolist() == [8.0, 6.0]
+        others = judged([off(0.1, 0.0), off(2.0, 0.0), off(2.2, 0.0), off(0.0, 3.0)], 9.0, 8.0, 7.0, 6.0)
+        assert rivals(judged([TRUTH], 10.0), others, PAIR, CONFIG.verify).scores_m.tolist() == [8.0, 6.0]
 
     @pytest.mark.parametrize("chosen", [[], [0]])
     def test_joined_are_best_first(self, chosen):
-        one = Look(poses_of([off(1.0, 0.0), off(2.0, 0.0)]), np.array([4.0, 1.0]), np.ones(2), np.ones(2)).rows(chosen)
-        two = Look(poses_of([off(3.0, 0.0)]), np.array([5.0]), np.ones(1), np.ones(1))
-        assert one.joined(two).scores_m.tolist() == ([5.0, 4.0] if chosen else [5.0])
+        one = judged([off(1.0, 0.0), off(2.0, 0.0)], 4.0, 1.0).rows(chosen)
+        assert one.joined(judged([off(3.0, 0.0)], 5.0)).scores_m.tolist() == ([5.0, 4.0] if chosen else [5.0])

@@ -16,7 +16,7 @@ from mapmerge.outcome import Change, ChangeKind, Status
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import IDENTITY, Sim2
-from tests.floors import errors, filled, last_map, office_pair, office_run, pair_of
+from tests.floors import errors, filled, last_map, office_pair, office_run, pair_of, with_another_label
 
 ROBOTS = ("r1", "r2", "r3", "r4")
 ONE, TWO, THREE, FOUR = 10, 20, 30, 40
@@ -548,3 +548,46 @@ class TestSimulated:
         _, result = step(state, {"r2": last_map_of_a_run()}, MergeConfig())
         assert changes(result) == [("r2", ChangeKind.WITHDRAWN)]
         assert result.merged.same_as(pair.target.cropped_to_known())
+
+
+FREE = MergeConfig(scale="free")
+FACTORS = (1.0, 1.1, 0.5)
+
+
+@pytest.fixture(scope="module")
+def mislabelled():
+    """Return the truth of three robots' maps, two of which have wrong resolutions, and what is merged of them."""
+    runs = [office_run(4, *run) for run in ((0.0, 0.7, 0.4, 1), (1.0, 0.3, 1.9, 2), (0.8, 0.1, -0.7, 3))]
+    grids = [with_another_label(last_map(run), factor) for run, factor in zip(runs, FACTORS, strict=True)]
+    robots = ("r1", "r2", "r3")
+    _, result = step(MergeState.initial(robots), dict(zip(robots, grids, strict=True)), FREE)
+    return [pair_of(runs[0], run) for run in runs], result
+
+
+class TestFreeScale:
+    """With the default method."""
+
+    def test_scales_are_those_of_the_labels(self, mislabelled):
+        pairs, result = mislabelled
+        for pair, outcome, factor in zip(pairs, result.robots.values(), FACTORS, strict=True):
+            assert outcome.merged_from_map.scale == pytest.approx(1.0 / factor, rel=0.01)
+            position_m, angle_deg = pair.errors(outcome.merged_from_map @ Sim2(scale=factor))
+            assert position_m < 0.15
+            assert angle_deg < 0.5
+
+    def test_the_merged_map_is_of_the_references_size(self, mislabelled):
+        pairs, result = mislabelled
+        assert result.merged.resolution_m == pairs[0].target.resolution_m
+        true = fuse([Layer(pair.source, pair.target_from_source) for pair in pairs], pairs[0].target, FREE.cells)
+        assert result.merged.known_area_m2 == pytest.approx(true.grid.known_area_m2, rel=0.02)
+        for outcome, agreement in zip(result.robots.values(), true.agreements, strict=True):
+            assert outcome.agreement.acceptance == pytest.approx(agreement.acceptance, abs=0.03)
+            assert outcome.agreement.overlap_m2 == pytest.approx(agreement.overlap_m2, rel=0.03)
+
+    def test_a_change_of_scale_is_a_move(self, session, scripted):
+        session.step(r1=ONE)
+        reported = []
+        for number, scale in enumerate((1.0, 1.005, 1.02)):
+            scripted.fits(ONE, TWO + number, Sim2(scale=scale))
+            reported.append(bool(changes(session.step(r2=TWO + number))))
+        assert reported == [True, False, True]

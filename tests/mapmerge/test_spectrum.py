@@ -47,7 +47,7 @@ def test_a_few_long_walls_count_for_more_in_the_first_than_in_the_second():
     wall = np.stack([np.arange(0.0, 10.0, 0.1), np.zeros(100)], axis=1)
     short = np.stack([np.arange(0.0, 1.0, 0.1), np.zeros(10)], axis=1)
     turned = Sim2(yaw_rad=math.radians(40.0))
-    many = [turned.apply(short + (3.0 * (number % 6), 1.3 + 2.1 * (number // 6))) for number in range(30)]
+    many = [turned.apply(short + np.array([3.0 * (number % 6), 1.3 + 2.1 * (number // 6)])) for number in range(30)]
     peaked, summed = spectra(np.vstack([wall, *many]))
     along, across = 90, 130
     assert peaked[along] - peaked[across] > summed[along] - summed[across]

@@ -125,9 +125,7 @@ class TestValues:
         cells = np.zeros((2, 80, 80), np.int8)
         cells[0, 10], cells[1, 70] = 100, 100
         target, source = (prepared_map(Grid(layer, 0.05)) for layer in cells)
-        values = []
-        for surface in surfaces(target, source)[: len(WEIGHTS)]:
-            values.append(surface.values[surface.index(IDENTITY)])
+        values = [surface.values[surface.index(IDENTITY)] for surface in surfaces(target, source)[: len(WEIGHTS)]]
         assert values[0] < -1.0
         assert values == sorted(values, reverse=True)
 

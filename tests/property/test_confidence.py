@@ -21,6 +21,8 @@ def cues_of_some_placement(draw):
         wall_agreement=worse,
         other_wall_agreement=better,
         far_share=draw(shares) * (1 - worse),
+        slack_agreement=max(worse, draw(shares)),
+        bend_m=draw(st.floats(0.0, 2.0)),
         likeness=draw(shares),
         lead_m=draw(lengths_m),
         rival_agreement=draw(shares),
@@ -47,7 +49,12 @@ def test_is_a_probability(cues):
 def test_more_agreement_never_lowers_it(cues, share):
     """Of both directions together: the worse one stays the worse one."""
     more = cues.wall_agreement + share * (1.0 - cues.wall_agreement)
-    better = replace(cues, wall_agreement=more, other_wall_agreement=max(more, cues.other_wall_agreement))
+    better = replace(
+        cues,
+        wall_agreement=more,
+        other_wall_agreement=max(more, cues.other_wall_agreement),
+        slack_agreement=max(more, cues.slack_agreement),
+    )
     assert confidence(better) >= confidence(cues) - ROUNDING
 
 
@@ -83,3 +90,9 @@ def test_more_of_the_same_never_lowers_it(cues, factor):
         overlap_m2=cues.overlap_m2 * factor,
     )
     assert confidence(larger) >= confidence(cues) - ROUNDING
+
+
+@given(anything, st.floats(0.999, 1.0))
+def test_of_two_placements_that_are_as_good_one_is_wrong(cues, likeness):
+    """However well both fit."""
+    assert confidence(replace(cues, likeness=likeness, lead_m=0.0)) <= 0.51

@@ -23,7 +23,7 @@ seeds = st.integers(0, 5)
 
 
 def seen_from(yaw_rad, resolution_m, seed, frame):
-    """Return a map of the flat whose cells lie at a turn to its walls, in a map frame; and the floor from that frame."""
+    """Return a map of the flat whose cells lie at a turn to its walls, and where its map frame lies on the floor."""
     floor_from_grid = Sim2(FLAT_M[0] / 2, FLAT_M[1] / 2, yaw_rad) @ Sim2(-6.5, -6.5)
     grid = flat(floor_from_grid, resolution_m=resolution_m, ragged=seed, size_m=13.0)
     return in_frame(grid, frame), floor_from_grid @ frame.inverse()
