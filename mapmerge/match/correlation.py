@@ -108,12 +108,7 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
 
 def _search(pair: PairOfMaps, rotations: tuple[float, ...], config: MergeConfig) -> _Found | None:
     """Return the best placement and its rivals, after a second look if the first one is not clear."""
-    scales: tuple[float, float] = (1.0, 1.0)
-    steps: tuple[float, ...] = (1.0,)
-    if config.scale == "free":
-        least, largest = config.scale_range
-        scales = (1 / largest, 1 / least) if pair.swapped else (least, largest)
-        steps = all_scales(*scales, config.search.scale_step)
+    scales, steps = _scales(pair, config)
     if pair.prior is not None:
         starts = by_prior(pair, config.search)
         if len(steps) > 1:
@@ -125,6 +120,15 @@ def _search(pair: PairOfMaps, rotations: tuple[float, ...], config: MergeConfig)
         return found
     again = look(pair, by_sweep(pair, config.search), scales, config)
     return _ranked(pair, seen.joined(again), scales, config)
+
+
+def _scales(pair: PairOfMaps, config: MergeConfig) -> tuple[tuple[float, float], tuple[float, ...]]:
+    """Return the least and the largest scale of the pair's placement, and those that are tried."""
+    if config.scale == "metadata":
+        return (1.0, 1.0), (1.0,)
+    least, largest = config.scale_range
+    limits = (1 / largest, 1 / least) if pair.swapped else (least, largest)
+    return limits, all_scales(*limits, config.search.scale_step)
 
 
 def _ranked(pair: PairOfMaps, seen: Look, scales: tuple[float, float], config: MergeConfig) -> _Found | None:

@@ -40,8 +40,8 @@ class CorrelationSurface:
 
     def shift_m(self, rows: Indices, cols: Indices) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the shifts in x and y of some values."""
-        x_m = np.asarray(cols * self.step_m + self.origin_m[0], np.float64)
-        return x_m, np.asarray(rows * self.step_m + self.origin_m[1], np.float64)
+        x_m, y_m = self.origin_m
+        return cols.astype(np.float64) * self.step_m + x_m, rows.astype(np.float64) * self.step_m + y_m
 
     def index(self, target_from_source: Sim2) -> tuple[int, int]:
         """Return row and column of the shift that is nearest to that of a placement."""
@@ -119,7 +119,7 @@ class TranslationSearch:
             )
             for spectra in self._spectra
         ]
-        # turned by 180°, cell k becomes cell −k, whose far corner is the near one of before: no shift is negative
+        # turned by 180°, cell k becomes cell −k, whose far corner is the near one of before: none is below the first
         corner_m = (low_x_m + cell_m, low_y_m + cell_m)
         back = [
             CorrelationSurface(half, _correlated(spectra, walls, free, False), corner_m, cell_m)
