@@ -108,8 +108,8 @@ class TestHeld:
 
 
 @pytest.mark.parametrize("place", [Sim2(), Sim2(90.0, 3.0, 2.0), Sim2(0.3, 0.1, 0.2, 1.7)])
-@pytest.mark.parametrize(("one", "other"), [(100, 100), (100, -1), (100, 0)])
-def test_maps_without_much_on_them_have_cues_and_a_confidence(one, other, place):
+@pytest.mark.parametrize(("one", "other"), [(100, 100), (100, 65)])
+def test_maps_of_nothing_but_walls_have_cues_and_a_confidence(one, other, place):
     found = cues(pair_of_maps(filled(one, 30, 40), filled(other, 20, 20)), place, against(3.0))
     assert all(math.isfinite(getattr(found, field.name)) for field in fields(Cues))
     assert all(0.0 <= getattr(found, name) <= 1.0 for name in SHARES)
