@@ -27,9 +27,21 @@ Array = NDArray[np.float64]
 AGAINST = {"far_share", "bend_m", "likeness", "rival_agreement"}
 """Cues that speak against a placement; all others speak for it."""
 _QUANTILES = (0.02, 0.15, 0.35, 0.6, 0.85, 0.98)
-_PENALTY = 2e-6
-_STEPS = 6000
-_LIKENESS = [cue.name for cue in fields(Cues)].index("likeness")
+_KNOTS = {
+    "matched_wall_m": (8, 11, 15, 20, 28, 40, 60, 90, 130, 200, 300),
+    "wall_agreement": (0.5, 0.65, 0.72, 0.78, 0.82, 0.86, 0.9, 0.93, 0.96, 0.98, 1.0),
+    "slack_agreement": (0.5, 0.65, 0.72, 0.78, 0.82, 0.86, 0.9, 0.93, 0.96, 0.98, 1.0),
+    "far_share": (0.0, 0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2),
+    "likeness": (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.78, 0.85, 0.92, 1.0),
+    "lead_m": (0, 2, 4, 7, 11, 16, 24, 35, 50, 80, 120, 200),
+    "clearance": (-3.0, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0),
+    "rival_agreement": (0.0, 0.6, 0.7, 0.78, 0.84, 0.88, 0.92, 0.95, 0.98, 1.0),
+    "acceptance": (0.5, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.985, 1.0),
+    "overlap_m2": (1, 5, 10, 14, 18, 24, 32, 45, 65, 100, 160, 250),
+}
+"""Where curves bend; those of other cues at quantiles of what was seen."""
+_PENALTY = 3e-5
+_STEPS = 9000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,13 +65,13 @@ class Model:
     def confidence(self, cues: Array) -> Array:
         """Return the probability of each row of cues, shape (N, number of cues)."""
         log_odds = self.intercept + _ramps(cues, self.knots) @ np.concatenate(self.rises)
-        shared = [contenders(likeness) for likeness in cues[:, _LIKENESS].tolist()]
+        shared = np.array([contenders(Cues(*row)) for row in cues.tolist()])
         return np.asarray(1.0 / (1.0 + np.exp(-log_odds)) / shared, np.float64)
 
 
 def fitted(cues: Array, right: NDArray[np.bool_], weights: Array) -> Model:
     """Return the model of largest likelihood, with a small penalty on what it adds, found by projected descent."""
-    knots = tuple(_knots(cues[:, column]) for column in range(cues.shape[1]))
+    knots = tuple(_knots(cue.name, cues[:, column]) for column, cue in enumerate(fields(Cues)))
     ramps = _ramps(cues, knots)
     signs = np.concatenate(
         [
@@ -95,7 +107,9 @@ def balanced(found: Sequence[Observation]) -> Array:
     return np.array([1.0 / sizes[item.group] for item in found])
 
 
-def _knots(values: Array) -> Array:
+def _knots(cue: str, values: Array) -> Array:
+    if cue in _KNOTS:
+        return np.array(_KNOTS[cue], np.float64)
     knots = np.unique(np.quantile(values, _QUANTILES).round(4))
     return knots if len(knots) > 1 else np.array([knots[0], knots[0] + 1.0])
 

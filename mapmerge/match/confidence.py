@@ -15,6 +15,8 @@ from mapmerge.match.calibration import CURVES, INTERCEPT
 from mapmerge.match.cues import Cues
 
 _ALIKE, _AS_GOOD = 0.85, 0.98
+_FITS_BETTER = 0.03
+_CONTESTED, _AS_CONTESTED = 0.3, 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +38,7 @@ class Curve:
         """Return the contribution of a value."""
         total = 0.0
         for (low, high), rise in zip(pairwise(self.knots), self.rises, strict=True):
-            total += rise * min(1.0, max(0.0, (value - low) / (high - low)))
+            total += rise * _ramp(value, low, high)
         return total
 
 
@@ -46,12 +48,19 @@ _CURVES = {cue: Curve(knots, rises) for cue, (knots, rises) in CURVES.items()}
 def confidence(cues: Cues) -> float:
     """Return the calibrated probability that a placement with these cues is right."""
     log_odds = INTERCEPT + sum(curve.at(getattr(cues, cue)) for cue, curve in _CURVES.items())
-    return 1.0 / (1.0 + math.exp(-log_odds)) / contenders(cues.likeness)
+    return 1.0 / (1.0 + math.exp(-log_odds)) / contenders(cues)
 
 
-def contenders(likeness: float) -> float:
-    """Return among how many placements the choice is: from 1 to 2, where a rival is as good.
+def contenders(cues: Cues) -> float:
+    """Return among how many placements the choice is, from 1 to 2, which no sum of cues may outweigh.
 
-    Of two that are as good only one is right, which no sum of other cues may outweigh.
+    Of two placements that are as good only one is right. Nor can the better one be told where the walls of the other,
+    over a good part of the length, agree better: so look the two halves of a symmetric building.
     """
-    return 1.0 + min(1.0, max(0.0, (likeness - _ALIKE) / (_AS_GOOD - _ALIKE)))
+    as_good = _ramp(cues.likeness, _ALIKE, _AS_GOOD)
+    fits_better = _ramp(cues.rival_agreement - cues.wall_agreement, 0.0, _FITS_BETTER)
+    return 1.0 + max(as_good, _ramp(fits_better * cues.likeness, _CONTESTED, _AS_CONTESTED))
+
+
+def _ramp(value: float, low: float, high: float) -> float:
+    return min(1.0, max(0.0, (value - low) / (high - low)))

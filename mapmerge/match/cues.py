@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from mapmerge.sim2 import Sim2
 from mapmerge.verify import Scores
 
 _SUBSTANTIAL = 0.3
+_LEAST_SHARE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +42,8 @@ class Cues:
         Score of the best distinct rival over that of the placement, 0 to 1.
     lead_m
         Score of the placement less that of its best distinct rival.
+    clearance
+        Logarithm of the lead over the wall that contradicts the placement even if the maps may bend, 1 m added to each.
     rival_agreement
         Largest wall agreement of rivals that match a good part of the wall that the placement does; 0 if none does.
     acceptance
@@ -62,6 +66,7 @@ class Cues:
     bend_m: float
     likeness: float
     lead_m: float
+    clearance: float
     rival_agreement: float
     acceptance: float
     overlap_m2: float
@@ -83,6 +88,7 @@ def cues_of(pair: PairOfMaps, target_from_source: Sim2, scores: Scores, rivals: 
     substantial = rivals.matched_m >= max(config.verify.min_matched_wall_m, _SUBSTANTIAL * scores.matched_wall_m)
     aligned, held_m, tight_share = _fit(target, source, pose, config.verify)
     bent = slack(target, source, target_from_source, config.slack)
+    lead_m = max(0.0, scores.score_m - rival_m)
     return Cues(
         matched_wall_m=scores.matched_wall_m,
         wall_agreement=scores.wall_agreement,
@@ -91,7 +97,8 @@ def cues_of(pair: PairOfMaps, target_from_source: Sim2, scores: Scores, rivals: 
         slack_agreement=bent.share,
         bend_m=bent.bend_m,
         likeness=min(1.0, rival_m / scores.score_m) if scores.score_m > 0 else 1.0,
-        lead_m=max(0.0, scores.score_m - rival_m),
+        lead_m=lead_m,
+        clearance=clearance(lead_m, scores.matched_wall_m, bent.share),
         rival_agreement=float(rivals.shares[substantial].max(initial=0.0)),
         acceptance=scores.acceptance,
         overlap_m2=scores.overlap_m2,
@@ -100,6 +107,12 @@ def cues_of(pair: PairOfMaps, target_from_source: Sim2, scores: Scores, rivals: 
         held_m=held_m,
         tight_share=tight_share,
     )
+
+
+def clearance(lead_m: float, matched_wall_m: float, slack_agreement: float) -> float:
+    """Return `Cues.clearance`."""
+    contradicted_m = matched_wall_m * (1.0 / max(slack_agreement, _LEAST_SHARE) - 1.0)
+    return math.log((1.0 + lead_m) / (1.0 + contradicted_m))
 
 
 def _fit(target: PreparedMap, source: PreparedMap, pose: Poses, config: VerifyConfig) -> tuple[float, float, float]:
