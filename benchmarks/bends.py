@@ -15,7 +15,7 @@ from samples.mission import known_at
 from samples.pairs import Pair
 from samples.world import Rng
 
-BENT_SHARE = 0.4
+BENT_SHARE = 0.3
 MOST_M = 0.45
 _LENGTH_M = (4.0, 12.0)
 _MOST_POINTS = 4000

@@ -19,6 +19,7 @@ from benchmarks.observations import Observation, groups, read
 from benchmarks.reliability import binned, diagram, wilson
 from mapmerge.config import MergeConfig
 from mapmerge.match import calibration
+from mapmerge.match.confidence import contenders
 from mapmerge.match.cues import Cues
 
 Array = NDArray[np.float64]
@@ -26,8 +27,9 @@ Array = NDArray[np.float64]
 AGAINST = {"far_share", "bend_m", "likeness", "rival_agreement"}
 """Cues that speak against a placement; all others speak for it."""
 _QUANTILES = (0.02, 0.15, 0.35, 0.6, 0.85, 0.98)
-_PENALTY = 2e-5
+_PENALTY = 2e-6
 _STEPS = 6000
+_LIKENESS = [cue.name for cue in fields(Cues)].index("likeness")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +53,8 @@ class Model:
     def confidence(self, cues: Array) -> Array:
         """Return the probability of each row of cues, shape (N, number of cues)."""
         log_odds = self.intercept + _ramps(cues, self.knots) @ np.concatenate(self.rises)
-        return np.asarray(1.0 / (1.0 + np.exp(-log_odds)), np.float64)
+        shared = [contenders(likeness) for likeness in cues[:, _LIKENESS].tolist()]
+        return np.asarray(1.0 / (1.0 + np.exp(-log_odds)) / shared, np.float64)
 
 
 def fitted(cues: Array, right: NDArray[np.bool_], weights: Array) -> Model:

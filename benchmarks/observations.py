@@ -30,6 +30,7 @@ BLOCK = 4
 PAIRS_A_MISSION = 18
 CROSSED_A_BLOCK = 20
 RIGHT_M, RIGHT_RAD = 0.5, math.radians(3.0)
+BENT_SLACK = 2.0
 _LEAST_OVERLAP = 0.08
 _CUTS_A_JOB = 100
 
@@ -52,8 +53,10 @@ class Observation:
         By construction.
     overlap
         True share of the smaller map that both know.
-    right
-        Whether the placement is the true one.
+    bent
+        Whether the maps were bent.
+    error_m, error_rad
+        How far the placement is off amid the overlap; 0 of strangers.
     cues
         What spoke for and against it.
     """
@@ -64,8 +67,16 @@ class Observation:
     related: bool
     ambiguous: bool
     overlap: float
-    right: bool
+    bent: bool
+    error_m: float
+    error_rad: float
     cues: Cues
+
+    @property
+    def right(self) -> bool:
+        """Whether the placement is the true one, give or take what a bent map leaves open."""
+        slack = BENT_SLACK if self.bent else 1.0
+        return self.related and self.error_m <= slack * RIGHT_M and self.error_rad <= slack * RIGHT_RAD
 
     @staticmethod
     def parse(line: str) -> Observation:
@@ -94,8 +105,8 @@ def observed(job: Job) -> list[Observation]:
     rng = np.random.default_rng([job.first, 80])
     found = []
     for pair, held_out in made:
-        shown = bent(pair, rng) if rng.uniform() < BENT_SHARE else pair
-        item = _observation(shown, job.group, held_out=held_out)
+        is_bent = bool(rng.uniform() < BENT_SHARE)
+        item = _observation(bent(pair, rng) if is_bent else pair, job.group, held_out=held_out, is_bent=is_bent)
         found += [item] if item else []
     return found
 
@@ -149,7 +160,7 @@ def _recorded(first: int) -> Iterator[tuple[Pair, bool]]:
     yield from cut_strangers(first, _CUTS_A_JOB)
 
 
-def _observation(pair: Pair, group: str, *, held_out: bool) -> Observation | None:
+def _observation(pair: Pair, group: str, *, held_out: bool, is_bent: bool) -> Observation | None:
     config = MergeConfig()
     matcher = load_matcher(config.method)
     grids = pair.target, pair.source
@@ -158,16 +169,18 @@ def _observation(pair: Pair, group: str, *, held_out: bool) -> Observation | Non
     match = matcher.match(target, source, config)
     if match.cues is None or match.target_from_source is None:
         return None
-    right = pair.truth is not None and is_right(match.target_from_source, pair.truth, pair.centre_m)
+    off = errors(match.target_from_source, pair.truth, pair.centre_m) if pair.truth else (0.0, 0.0)
     related = pair.truth is not None
-    return Observation(pair.name, group, held_out, related, pair.ambiguous, pair.overlap, right, match.cues)
+    return Observation(
+        pair.name, group, held_out, related, pair.ambiguous, pair.overlap, is_bent, off[0], off[1], match.cues
+    )
 
 
-def is_right(found: Sim2, truth: Sim2, at_m: tuple[float, float]) -> bool:
-    """Tell whether a placement is the true one, give or take what a bent map leaves open."""
+def errors(found: Sim2, truth: Sim2, at_m: tuple[float, float]) -> tuple[float, float]:
+    """Return how far a placement is off, in metres at a point of the source, and in radians."""
     (x_m, y_m), (true_x_m, true_y_m) = found.apply_point(*at_m), truth.apply_point(*at_m)
     turn_rad = abs(wrap_angle(found.yaw_rad - truth.yaw_rad))
-    return math.hypot(x_m - true_x_m, y_m - true_y_m) <= RIGHT_M and turn_rad <= RIGHT_RAD
+    return math.hypot(x_m - true_x_m, y_m - true_y_m), turn_rad
 
 
 def groups(found: Iterable[Observation]) -> dict[str, list[Observation]]:

@@ -46,6 +46,12 @@ _CURVES = {cue: Curve(knots, rises) for cue, (knots, rises) in CURVES.items()}
 def confidence(cues: Cues) -> float:
     """Return the calibrated probability that a placement with these cues is right."""
     log_odds = INTERCEPT + sum(curve.at(getattr(cues, cue)) for cue, curve in _CURVES.items())
-    # of two placements that are as good only one is right, which no sum of other cues may outweigh
-    as_good = min(1.0, max(0.0, (cues.likeness - _ALIKE) / (_AS_GOOD - _ALIKE)))
-    return 1.0 / (1.0 + math.exp(-log_odds)) / (1.0 + as_good)
+    return 1.0 / (1.0 + math.exp(-log_odds)) / contenders(cues.likeness)
+
+
+def contenders(likeness: float) -> float:
+    """Return among how many placements the choice is: from 1 to 2, where a rival is as good.
+
+    Of two that are as good only one is right, which no sum of other cues may outweigh.
+    """
+    return 1.0 + min(1.0, max(0.0, (likeness - _ALIKE) / (_AS_GOOD - _ALIKE)))

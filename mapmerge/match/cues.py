@@ -17,6 +17,8 @@ from mapmerge.score import agreement, probe
 from mapmerge.sim2 import Sim2
 from mapmerge.verify import Scores
 
+_SUBSTANTIAL = 0.3
+
 
 @dataclass(frozen=True, slots=True)
 class Cues:
@@ -39,7 +41,7 @@ class Cues:
     lead_m
         Score of the placement less that of its best distinct rival.
     rival_agreement
-        Largest wall agreement of rivals that match about as much wall as a placement must; 0 if there is none.
+        Largest wall agreement of rivals that match a good part of the wall that the placement does; 0 if none does.
     acceptance
         Acceptance index ω.
     overlap_m2, overlap_fraction
@@ -78,7 +80,7 @@ def cues_of(pair: PairOfMaps, target_from_source: Sim2, scores: Scores, rivals: 
     judged_m = sum(float(tally.matched_m[0] + tally.violated_m[0]) for tally in (found.ahead, found.back))
     far_m = float(found.ahead.far_m[0] + found.back.far_m[0])
     rival_m = max(0.0, float(rivals.scores_m[0])) if len(rivals.scores_m) else 0.0
-    substantial = rivals.matched_m >= config.verify.min_matched_wall_m
+    substantial = rivals.matched_m >= max(config.verify.min_matched_wall_m, _SUBSTANTIAL * scores.matched_wall_m)
     aligned, held_m, tight_share = _fit(target, source, pose, config.verify)
     bent = slack(target, source, target_from_source, config.slack)
     return Cues(
