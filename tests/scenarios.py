@@ -21,7 +21,6 @@ from tests.runs import (
     bad_messages,
     bare_room,
     begun_anew,
-    flat_map,
     growing,
     in_log_order,
     link,
