@@ -259,5 +259,5 @@ class MergeConfig(Settings):
     def __post_init__(self) -> None:
         super(MergeConfig, self).__post_init__()
         least, largest = self.scale_range
-        if not least <= 1.0 <= largest:
-            raise ConfigError(f"scale_range is {self.scale_range}; expected a factor up to 1, and one from 1")
+        if not least <= largest:
+            raise ConfigError(f"scale_range is {self.scale_range}; expected the smaller factor first")

@@ -21,7 +21,6 @@ from tests.runs import (
     bad_messages,
     bare_room,
     begun_anew,
-    flat_map,
     growing,
     in_log_order,
     link,
@@ -71,7 +70,7 @@ SCENARIOS: dict[str, Scenario] = {
         images="changed",
     ),
     "restarted": Scenario(
-        lambda: [seen("r1", 0.0), seen("r2", 1.0), seen("r2", 2.0, begun_anew(flat_map("r2", 2.0)))],
+        lambda: [seen("r1", 0.0), seen("r2", 1.0), seen("r2", 2.0, begun_anew(bare_room()))],
         lambda last: [str(change.kind) for change in last.result.changes] == ["withdrawn"],
     ),
     "no_reference": Scenario(

@@ -64,7 +64,9 @@ def by_prior(pair: PairOfMaps, config: SearchConfig) -> Poses:
 
 
 def all_scales(least: float, largest: float, step: float) -> tuple[float, ...]:
-    """Return scales from the least to the largest whose ratio is about ``step``, evenly in the logarithm; 1 is one."""
+    """Return scales from the least to the largest whose ratio is about ``step``; 1 is one, where it is within."""
+    if not least <= 1.0 <= largest:
+        return tuple(least * scale for scale in all_scales(1.0, largest / least, step))
     below, above = (round(abs(math.log(end)) / math.log(step)) for end in (least, largest))
     return tuple(
         math.exp(math.log(least if number < 0 else largest) * abs(number) / max(below if number < 0 else above, 1))

@@ -91,6 +91,12 @@ class TestScales:
         ratios = np.divide(scales[1:], scales[:-1])
         assert (ratios <= step**1.5 + 1e-9).all()
 
+    @pytest.mark.parametrize("ends", [(1.6, 2.5), (0.4, 0.8)])
+    def test_span_a_range_that_leaves_out_1(self, ends):
+        scales = all_scales(*ends, 1.05)
+        assert (scales[0], scales[-1]) == pytest.approx(ends)
+        assert list(scales) == sorted(set(scales))
+
 
 class TestLittle:
     GRIDS = (filled(100, 1, 1), filled(100, 1, 100), filled(0, 40, 40), filled(-1, 4, 4), filled(100, 40, 40))
