@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from benchmarks.exhaustive import exhaustive
+from benchmarks.paper_cases import load_map
 from mapmerge.grid import Grid
 from mapmerge.sim2 import Sim2
 from replay.events import Merged
@@ -75,13 +76,13 @@ def map_sets(folder: Path) -> list[MapSet]:
 def _paper(folder: Path) -> list[MapSet]:
     """Return the sets of the paper's authors, who published no transforms: truth is an exhaustive search's."""
     sets = [
-        _searched(name, {item: saved_map(folder / f"{item}.yaml") for item in items}, [(items[0], items[1])])
+        _searched(name, {item: load_map(folder, item) for item in items}, [(items[0], items[1])])
         for name, items in PAPER_SETS.items()
     ]
     # This map is bent by metres: its walls meet at odd angles. There is no rigid placement to hold a method to.
-    bent = _searched(BENT_SET[0], {item: saved_map(folder / f"{item}.yaml") for item in BENT_SET[1]}, [BENT_SET[1]])
+    bent = _searched(BENT_SET[0], {item: load_map(folder, item) for item in BENT_SET[1]}, [BENT_SET[1]])
     sets.append(replace(bent, max_error_m=1.0, max_error_deg=5.0, is_extra=True))
-    wings = {name: saved_map(folder / f"{name}.yaml") for name in WINGS}
+    wings = {name: load_map(folder, name) for name in WINGS}
     return [*sets, _searched("paper wings", wings, [(WINGS[0], WINGS[1]), (WINGS[0], WINGS[2])])]
 
 

@@ -199,6 +199,8 @@ class VerifyConfig(Settings):
         of them agrees; else ambiguity, if a rival is more than so many times as good.
     min_confidence
         Least calibrated probability that the placement is right, where the method states one.
+    witness_confidence
+        Two matches that agree on a placement count together if the confidence of each is at least this.
     hopeful_confidence
         Merged maps of several robots are matched with another robot's if the confidence of any pair of them, which is
         too low by itself, is at least this.
@@ -216,6 +218,7 @@ class VerifyConfig(Settings):
     poor_agreement: float = 0.8
     rival_likeness: float = 0.5
     min_confidence: float = 0.999
+    witness_confidence: float = 0.9
     hopeful_confidence: float = 0.05
     distinct_m: float = 0.75
     distinct_rad: float = math.radians(5.0)

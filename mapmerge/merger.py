@@ -141,7 +141,7 @@ def step(
     believed = _pair_priors(robots[0], list(combinations(maps, 2)), priors or {}, state.result.priors)
     alone, prepared = _matched(state, maps, updated, config, believed)
     centres_m = {robot: _centre_m(maps[robot]) if robot in updated else state.centres_m[robot] for robot in maps}
-    matches, forest, unions = _linked(state.unions.without(updated), maps, centres_m, alone, config)
+    matches, forest, unions = _linked(state.unions.without(updated), maps, centres_m, alone, believed, config)
     pairs = _without_contradicted(matches, forest)
     layers = _layers(robots[0], maps, forest)
     fusion = fuse(list(layers.values()), grids[robots[0]], config.cells) if layers else None
@@ -206,6 +206,7 @@ def _linked(
     maps: Mapping[str, Grid],
     centres_m: Mapping[str, tuple[float, float]],
     alone: Mapping[Pair, Match],
+    believed: Mapping[Pair, Prior],
     config: MergeConfig,
 ) -> tuple[dict[Pair, Match], Forest, Unions]:
     """Place robots by the matches of pairs, then those that only merged maps can place, one after the other."""
@@ -213,7 +214,7 @@ def _linked(
     matches = dict(alone)
     forest = _placed(centres_m, matches, config)
     while True:
-        found, unions = united(forest, maps, alone, unions, matcher, config)
+        found, unions = united(forest, maps, alone, believed, unions, matcher, config)
         if found is None:
             return matches, forest, unions
         matches[found[0]] = found[1]

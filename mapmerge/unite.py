@@ -1,12 +1,13 @@
-"""Robots' maps as witnesses for each other: what no pair of maps can tell, merged maps may.
+"""Robots' maps as witnesses for each other: what no pair of maps can tell, several may.
 
-Robots that are linked already have one map together. A robot that shares a little ground with each of them, too little
-to be placed on any, may share enough with all.
+Robots that are linked already say together where another one lies. Each of two pairs may be a little less sure than is
+asked for; if both put the robot in the same place, they are surer together. And a robot that shares a little ground with
+each, too little to be placed on any, may share enough with their merged map.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
@@ -17,9 +18,11 @@ from mapmerge.graph import Forest
 from mapmerge.grid import Grid
 from mapmerge.match import Match, Matcher
 from mapmerge.outcome import Pair
-from mapmerge.reasons import Reason
+from mapmerge.reasons import Reason, ReasonCode
 
 Robots = tuple[str, ...]
+
+_UNCONTESTED = {ReasonCode.LOW_CONFIDENCE, ReasonCode.WALLS_DISAGREE}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,13 +49,15 @@ def united(
     forest: Forest,
     grids: Mapping[str, Grid],
     matches: Mapping[Pair, Match],
+    believed: Collection[Pair],
     unions: Unions,
     matcher: Matcher[Any],
     config: MergeConfig,
 ) -> tuple[tuple[Pair, Match] | None, Unions]:
-    """Return the surest match of merged maps, between the robots in whose frames they are, and all that were tried.
+    """Return the surest match that several maps agree on, or that merged maps give, and all of these that were tried.
 
-    Only those are tried of which at least one has several robots and some pair of robots was not hopeless.
+    Merged maps are tried only where one of them has several robots, some pair of robots was not hopeless, and nothing
+    is believed beforehand. Their match is between the robots in whose frames they are.
 
     Parameters
     ----------
@@ -62,6 +67,8 @@ def united(
         All maps.
     matches
         What is said of each pair of maps.
+    believed
+        Pairs of which something is believed beforehand.
     unions
         What was tried before.
     matcher, config
@@ -72,21 +79,89 @@ def united(
     best: tuple[Pair, Match] | None = None
     for one, two in combinations(groups, 2):
         key = groups[one], groups[two]
-        if max(map(len, key)) < 2 or not _is_hopeful(key, matches, config):
+        between = [pair for pair in matches if set(pair) & set(key[0]) and set(pair) & set(key[1])]
+        if max(map(len, key)) < 2 or set(between) & set(believed):
             continue
-        if key not in tried:
-            target, source = (_merged(robots, forest, grids, config) for robots in key)
-            tried[key] = _matched(target, source, matcher, config)
-        match = tried[key]
-        if match.accepted and (best is None or _surety(match) > _surety(best[1])):
-            best = (one, two), _named(match, key)
+        found = agreed(between, forest, grids, matches, config)
+        if found is None and _is_hopeful(between, matches, config):
+            if key not in tried:
+                target, source = (_merged(robots, forest, grids, config) for robots in key)
+                tried[key] = _matched(target, source, matcher, config)
+            found = (one, two), _named(tried[key], key)
+        if found and found[1].accepted and (best is None or _surety(found[1]) > _surety(best[1])):
+            best = found
     return best, Unions(tried)
 
 
-def _is_hopeful(key: tuple[Robots, Robots], matches: Mapping[Pair, Match], config: MergeConfig) -> bool:
-    """Tell whether of any pair of robots of the two groups there is a placement that may be right."""
-    pairs = (match for (a, b), match in matches.items() if {a, b} & set(key[0]) and {a, b} & set(key[1]))
-    return any((match.confidence or 0.0) >= config.verify.hopeful_confidence for match in pairs)
+def agreed(
+    between: Sequence[Pair],
+    forest: Forest,
+    grids: Mapping[str, Grid],
+    matches: Mapping[Pair, Match],
+    config: MergeConfig,
+) -> tuple[Pair, Match] | None:
+    """Return the surest refused match between two groups with the confidence that those which agree with it give it.
+
+    Only matches count that no rival contests and that are nearly sure by themselves: of look-alike places, all maps of one
+    would tell the same lie.
+
+    Returns
+    -------
+    pair, match
+        Accepted, if they are sure enough together; None if fewer than two count.
+    """
+    limits = config.verify
+    counted = [
+        pair
+        for pair in between
+        if matches[pair].reason.code in _UNCONTESTED and (matches[pair].confidence or 0.0) >= limits.witness_confidence
+    ]
+    if len(counted) < 2:
+        return None
+    best = max(counted, key=lambda pair: _surety(matches[pair]))
+    doubt, witnesses = 1.0, 0
+    for pair in counted:
+        if _agree(pair, best, forest, grids, matches, config):
+            doubt, witnesses = doubt * (1.0 - (matches[pair].confidence or 0.0)), witnesses + 1
+    match = matches[best]
+    if witnesses < 2 or 1.0 - doubt < limits.min_confidence:
+        return None
+    message = f"{witnesses} pairs of maps agree on the place of {best[1]} on {best[0]}, where by itself {match.reason.message}"
+    return best, replace(match, accepted=True, confidence=1.0 - doubt, reason=Reason(ReasonCode.ACCEPTED, message))
+
+
+def _agree(
+    one: Pair,
+    other: Pair,
+    forest: Forest,
+    grids: Mapping[str, Grid],
+    matches: Mapping[Pair, Match],
+    config: MergeConfig,
+) -> bool:
+    """Tell whether two matches between the same two groups put one group at the same place of the other."""
+    if one == other:
+        return True
+    poses = []
+    for target, source in (one, other):
+        found = matches[target, source].target_from_source
+        if found is None:
+            return False
+        target_frame, source_frame = (forest.placements[robot] for robot in (target, source))
+        pose = target_frame.component_from_map @ found @ source_frame.component_from_map.inverse()
+        poses.append(pose if target_frame.component == forest.placements[one[0]].component else pose.inverse())
+    at = forest.placements[one[1]].component_from_map.apply_point(*_middle_m(grids[one[1]]))
+    limits = config.verify
+    return poses[0].is_close(poses[1], distance_m=limits.distinct_m, angle_rad=limits.distinct_rad, at_m=at)
+
+
+def _middle_m(grid: Grid) -> tuple[float, float]:
+    known = grid.cropped_to_known()
+    return known.map_from_grid.apply_point(known.cols * known.resolution_m / 2, known.rows * known.resolution_m / 2)
+
+
+def _is_hopeful(between: Sequence[Pair], matches: Mapping[Pair, Match], config: MergeConfig) -> bool:
+    """Tell whether any of these pairs has a placement that may be right."""
+    return any((matches[pair].confidence or 0.0) >= config.verify.hopeful_confidence for pair in between)
 
 
 def _merged(robots: Robots, forest: Forest, grids: Mapping[str, Grid], config: MergeConfig) -> Grid:

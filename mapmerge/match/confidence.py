@@ -16,7 +16,7 @@ from mapmerge.match.cues import Cues
 
 _ALIKE, _AS_GOOD = 0.85, 0.98
 _FITS_BETTER = 0.03
-_CONTESTED, _AS_CONTESTED = 0.3, 0.5
+_CONTESTED, _AS_CONTESTED = 0.4, 0.55
 
 
 @dataclass(frozen=True, slots=True)
