@@ -30,7 +30,7 @@ BLOCK = 4
 PAIRS_A_MISSION = 18
 CROSSED_A_BLOCK = 20
 RIGHT_M, RIGHT_RAD = 0.5, math.radians(3.0)
-BENT_SLACK = 2.0
+BENT_RIGHT_M, BENT_RIGHT_RAD = 1.0, math.radians(5.0)
 _LEAST_OVERLAP = 0.08
 _CUTS_A_JOB = 100
 
@@ -75,8 +75,8 @@ class Observation:
     @property
     def right(self) -> bool:
         """Whether the placement is the true one, give or take what a bent map leaves open."""
-        slack = BENT_SLACK if self.bent else 1.0
-        return self.related and self.error_m <= slack * RIGHT_M and self.error_rad <= slack * RIGHT_RAD
+        limits = (BENT_RIGHT_M, BENT_RIGHT_RAD) if self.bent else (RIGHT_M, RIGHT_RAD)
+        return self.related and self.error_m <= limits[0] and self.error_rad <= limits[1]
 
     @staticmethod
     def parse(line: str) -> Observation:

@@ -80,8 +80,9 @@ class SearchConfig(Settings):
         Candidates of all rotations that are aligned, for each weight.
     sweep_step_rad, sweep_cell_m, sweep_free_weights, sweep_shifts
         The same for the second look, at all rotations.
-    scale_step
-        Ratio of two scales that are tried, where the scale is free.
+    scale_step, distinct_scale
+        Ratio of two scales that are tried, where the scale is free, and how far the logarithms of two are apart that
+        can be told from each other.
     clear_agreement, clear_wall_m, clear_likeness
         A placement is clear, and no second look is taken, with at least this wall agreement and so much matched wall,
         and no rival that is more than so many times as good.
@@ -103,6 +104,7 @@ class SearchConfig(Settings):
     sweep_free_weights: tuple[float, ...] = (1.0,)
     sweep_shifts: int = 4
     scale_step: float = 1.05
+    distinct_scale: float = 0.15
     clear_agreement: float = 0.9
     clear_wall_m: float = 10.0
     clear_likeness: float = 0.5
@@ -194,13 +196,18 @@ class VerifyConfig(Settings):
         Least length of wall that both maps saw.
     min_acceptance
         Least acceptance index ω; of the methods that state no confidence.
+    least_agreement
+        Least share of the walls in the overlap that must agree, however sure a placement is otherwise.
     poor_agreement, rival_likeness
         What is named as the reason where the confidence is too low: walls that disagree, if less than this share
         of them agrees; else ambiguity, if a rival is more than so many times as good.
+    clearly_worse
+        A placement within a prior is refused if its score is less than this share of what the maps reach elsewhere.
     min_confidence
         Least calibrated probability that the placement is right, where the method states one.
-    witness_confidence
-        Two matches that agree on a placement count together if the confidence of each is at least this.
+    witness_confidence, nearly_sure_confidence
+        Two matches that agree on a placement count together if the confidence of each is at least the first, and that
+        of one of them the second.
     hopeful_confidence
         Merged maps of several robots are matched with another robot's if the confidence of any pair of them, which is
         too low by itself, is at least this.
@@ -215,10 +222,13 @@ class VerifyConfig(Settings):
     min_overlap_m2: float = 10.0
     min_matched_wall_m: float = 8.0
     min_acceptance: float = 0.95
+    least_agreement: float = 0.7
     poor_agreement: float = 0.8
     rival_likeness: float = 0.5
+    clearly_worse: float = 0.85
     min_confidence: float = 0.999
     witness_confidence: float = 0.9
+    nearly_sure_confidence: float = 0.99
     hopeful_confidence: float = 0.05
     distinct_m: float = 0.75
     distinct_rad: float = math.radians(5.0)

@@ -1,12 +1,13 @@
 """Robots' maps as witnesses for each other: what no pair of maps can tell, several may.
 
-Robots that are linked already say together where another one lies. Each of two pairs may be a little less sure than is
-asked for; if both put the robot in the same place, they are surer together. And a robot that shares a little ground with
-each, too little to be placed on any, may share enough with their merged map.
+Robots that are linked already say together where another one lies. Each of two pairs may be a little less sure than
+is asked for; if both put the robot in the same place, they are surer together. And a robot that shares a little ground
+with each, too little to be placed on any, may share enough with their merged map.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
@@ -17,24 +18,29 @@ from mapmerge.fuse import Layer, fuse
 from mapmerge.graph import Forest
 from mapmerge.grid import Grid
 from mapmerge.match import Match, Matcher
+from mapmerge.match.confidence import HIGHEST
 from mapmerge.outcome import Pair
 from mapmerge.reasons import Reason, ReasonCode
+from mapmerge.sim2 import Sim2
 
 Robots = tuple[str, ...]
+Placed = tuple[tuple[str, Sim2], ...]
 
 _UNCONTESTED = {ReasonCode.LOW_CONFIDENCE, ReasonCode.WALLS_DISAGREE}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Unions:
-    """Matches of merged maps, by the robots of both, for as long as none of their maps changes."""
+    """Matches of merged maps, by the robots of both and where these lie, for as long as none of their maps changes."""
 
-    matches: Mapping[tuple[Robots, Robots], Match] = field(default_factory=dict)
+    matches: Mapping[tuple[Placed, Placed], Match] = field(default_factory=dict)
 
     def without(self, updated: Sequence[str]) -> Unions:
         """Return the matches that are of none of these robots."""
-        kept = {key: match for key, match in self.matches.items() if not {*key[0], *key[1]} & set(updated)}
-        return Unions(kept)
+        gone = set(updated)
+        return Unions(
+            {key: match for key, match in self.matches.items() if not gone & {robot for robot, _ in sum(key, ())}}
+        )
 
 
 def components(forest: Forest) -> dict[str, Robots]:
@@ -84,10 +90,13 @@ def united(
             continue
         found = agreed(between, forest, grids, matches, config)
         if found is None and _is_hopeful(between, matches, config):
-            if key not in tried:
+            places = _places(key[0], forest), _places(key[1], forest)
+            if places not in tried:
                 target, source = (_merged(robots, forest, grids, config) for robots in key)
-                tried[key] = _matched(target, source, matcher, config)
-            found = (one, two), _named(tried[key], key)
+                match = _matched(target, source, matcher, config)
+                # the maps of a refused one need not be kept
+                tried[places] = match if match.accepted else replace(match, evidence=())
+            found = (one, two), _named(tried[places], key)
         if found and found[1].accepted and (best is None or _surety(found[1]) > _surety(best[1])):
             best = found
     return best, Unions(tried)
@@ -102,8 +111,8 @@ def agreed(
 ) -> tuple[Pair, Match] | None:
     """Return the surest refused match between two groups with the confidence that those which agree with it give it.
 
-    Only matches count that no rival contests and that are nearly sure by themselves: of look-alike places, all maps of one
-    would tell the same lie.
+    Only matches count that no rival contests and that are nearly sure by themselves: of look-alike places, all maps
+    of one would tell the same lie.
 
     Returns
     -------
@@ -118,16 +127,19 @@ def agreed(
     ]
     if len(counted) < 2:
         return None
-    best = max(counted, key=lambda pair: _surety(matches[pair]))
-    doubt, witnesses = 1.0, 0
-    for pair in counted:
-        if _agree(pair, best, forest, grids, matches, config):
-            doubt, witnesses = doubt * (1.0 - (matches[pair].confidence or 0.0)), witnesses + 1
+    best, *others = sorted(counted, key=lambda pair: _surety(matches[pair]), reverse=True)
+    agreeing = [pair for pair in others if _agree(pair, best, forest, grids, matches, config)]
+    # more than one witness is no surer: they saw the same place, and may err together
+    confidences = [matches[pair].confidence or 0.0 for pair in (best, *agreeing[:1])]
+    doubt = math.prod(1.0 - confidence for confidence in confidences)
     match = matches[best]
-    if witnesses < 2 or 1.0 - doubt < limits.min_confidence:
+    if not agreeing or confidences[0] < limits.nearly_sure_confidence or 1.0 - doubt < limits.min_confidence:
         return None
-    message = f"{witnesses} pairs of maps agree on the place of {best[1]} on {best[0]}, where by itself {match.reason.message}"
-    return best, replace(match, accepted=True, confidence=1.0 - doubt, reason=Reason(ReasonCode.ACCEPTED, message))
+    witnesses = 1 + len(agreeing)
+    message = f"{witnesses} pairs of maps agree where {best[1]} lies on {best[0]}; by itself, {match.reason.message}"
+    return best, replace(
+        match, accepted=True, confidence=min(1.0 - doubt, HIGHEST), reason=Reason(ReasonCode.ACCEPTED, message)
+    )
 
 
 def _agree(
@@ -162,6 +174,10 @@ def _middle_m(grid: Grid) -> tuple[float, float]:
 def _is_hopeful(between: Sequence[Pair], matches: Mapping[Pair, Match], config: MergeConfig) -> bool:
     """Tell whether any of these pairs has a placement that may be right."""
     return any((matches[pair].confidence or 0.0) >= config.verify.hopeful_confidence for pair in between)
+
+
+def _places(robots: Robots, forest: Forest) -> Placed:
+    return tuple((robot, forest.placements[robot].component_from_map) for robot in robots)
 
 
 def _merged(robots: Robots, forest: Forest, grids: Mapping[str, Grid], config: MergeConfig) -> Grid:

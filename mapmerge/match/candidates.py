@@ -90,7 +90,7 @@ def _correlated(
         for number, surface in enumerate(search.surfaces(turn)):
             poses, values = surface_peaks(surface, config.peak_distance_m)
             if pair.prior is not None:
-                near = pair.allowed(poses, _SLACK_M, _SLACK_RAD)
+                near = pair.allowed(poses, _SLACK_M + _SLACK_RAD * pair.reach_m, _SLACK_RAD)
                 poses, values = poses[near], values[near]
             found[number % len(free_weights)].append((poses[:shifts], values[:shifts]))
     best = [_best(peaks, most) for peaks in found if peaks]

@@ -16,7 +16,11 @@ from mapmerge.match.cues import Cues
 
 _ALIKE, _AS_GOOD = 0.85, 0.98
 _FITS_BETTER = 0.03
+_MOST_LOG_ODDS = 50.0
 _CONTESTED, _AS_CONTESTED = 0.4, 0.55
+
+HIGHEST = 0.9999
+"""No placement is called surer: what is seldomer than 1 in 10 000 was not measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +49,19 @@ class Curve:
 _CURVES = {cue: Curve(knots, rises) for cue, (knots, rises) in CURVES.items()}
 
 
-def confidence(cues: Cues) -> float:
-    """Return the calibrated probability that a placement with these cues is right."""
+def confidence(cues: Cues, tries: float = 1.0) -> float:
+    """Return the calibrated probability that a placement with these cues is right.
+
+    Parameters
+    ----------
+    cues
+        What speaks for and against it.
+    tries
+        It is the best of so many independent searches, each of which might have found a wrong one.
+    """
     log_odds = INTERCEPT + sum(curve.at(getattr(cues, cue)) for cue, curve in _CURVES.items())
-    return 1.0 / (1.0 + math.exp(-log_odds)) / contenders(cues)
+    share = 1.0 / (1.0 + math.exp(-min(max(log_odds, -_MOST_LOG_ODDS), _MOST_LOG_ODDS)))
+    return max(0.0, min(HIGHEST, 1.0 - tries * (1.0 - share))) / contenders(cues)
 
 
 def contenders(cues: Cues) -> float:

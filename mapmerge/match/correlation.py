@@ -30,7 +30,7 @@ from mapmerge.match.look import Look, beside, look, rivals
 from mapmerge.match.pair import DescribedMap, PairOfMaps
 from mapmerge.match.spectrum import orientation_spectra, spectrum_correlation
 from mapmerge.match.surface import TranslationSearch
-from mapmerge.match.verdict import contradicted, judge, too_little_structure
+from mapmerge.match.verdict import contradicted, judge, too_little_structure, within
 from mapmerge.polish import polish
 from mapmerge.prepare import prepare
 from mapmerge.prior import Prior
@@ -70,11 +70,22 @@ class CorrelationMatcher:
         first, second = (source, target) if swapped else (target, source)
         pair = PairOfMaps(first, second, prior, swapped)
         match = _matched(pair, config)
-        if prior is not None and not match.accepted:
-            elsewhere = _matched(PairOfMaps(first, second, swapped=swapped), config)
-            if elsewhere.accepted:
-                match = contradicted(match, elsewhere, prior, pair, config.verify)
+        if prior is not None:
+            match = _held_against(match, _matched(PairOfMaps(first, second, swapped=swapped), config), pair, config)
         return _inverted(match) if swapped else match
+
+
+def _held_against(match: Match, elsewhere: Match, pair: PairOfMaps, config: MergeConfig) -> Match:
+    """Return the match within a prior, refused if the maps clearly fit elsewhere."""
+    if pair.prior is None or elsewhere.scores is None or elsewhere.target_from_source is None:
+        return match
+    found = poses_of([pair.between_grids(elsewhere.target_from_source)])
+    if not pair.allowed(found).all():
+        mine_m = match.scores.score_m if match.scores else 0.0
+        is_better = match.accepted and elsewhere.scores.score_m * config.verify.clearly_worse > mine_m
+        if is_better or (elsewhere.accepted and not match.accepted):
+            return contradicted(match, elsewhere, pair.prior, pair, config.verify)
+    return match if match.accepted else within(match, pair.prior)
 
 
 def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
@@ -85,7 +96,7 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
         reason = Reason(ReasonCode.NO_CANDIDATE, "no placement lets walls of the two maps coincide")
         return Match(None, None, accepted=False, reason=reason, evidence=(_spectra(pair, rotations),))
     cues = cues_of(pair, found.best, found.scores, found.rivals, config)
-    sure = confidence(cues)
+    sure = confidence(cues, _tries(config))
     reason = judge(found.scores, cues, sure, config.verify)
     return Match(
         target_from_source=pair.between_maps(found.best),
@@ -106,20 +117,26 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
     )
 
 
+def _tries(config: MergeConfig) -> float:
+    """Return among how many independent searches a placement is the best: one, or one for each scale that differs."""
+    least, largest = config.scale_range
+    return 1.0 if config.scale == "metadata" else 1.0 + math.log(largest / least) / config.search.distinct_scale
+
+
 def _search(pair: PairOfMaps, rotations: tuple[float, ...], config: MergeConfig) -> _Found | None:
     """Return the best placement and its rivals, after a second look if the first one is not clear."""
     scales, steps = _scales(pair, config)
     if pair.prior is not None:
         starts = by_prior(pair, config.search)
-        if len(steps) > 1:
+        if steps != (1.0,):
             starts = np.vstack([starts, by_spectra(pair, rotations, steps, config.search)])
-        return _ranked(pair, look(pair, starts, scales, config), scales, config)
+        return _polished(pair, _ranked(pair, look(pair, starts, scales, config), scales, config), config)
     seen = look(pair, by_spectra(pair, rotations, steps, config.search), scales, config)
-    found = _ranked(pair, seen, scales, config)
-    if found is not None and _is_clear(found, config):
-        return found
-    again = look(pair, by_sweep(pair, config.search), scales, config)
-    return _ranked(pair, seen.joined(again), scales, config)
+    ranked = _ranked(pair, seen, scales, config)
+    if not _is_clear(ranked, config) and scales[0] <= 1.0 <= scales[1]:
+        again = look(pair, by_sweep(pair, config.search), scales, config)
+        ranked = _ranked(pair, seen.joined(again), scales, config)
+    return _polished(pair, ranked, config)
 
 
 def _scales(pair: PairOfMaps, config: MergeConfig) -> tuple[tuple[float, float], tuple[float, ...]]:
@@ -131,32 +148,38 @@ def _scales(pair: PairOfMaps, config: MergeConfig) -> tuple[tuple[float, float],
     return limits, all_scales(*limits, config.search.scale_step)
 
 
-def _ranked(pair: PairOfMaps, seen: Look, scales: tuple[float, float], config: MergeConfig) -> _Found | None:
-    """Return the best placement, finely aligned, and its rivals; None if there is no placement at all."""
+def _ranked(pair: PairOfMaps, seen: Look, scales: tuple[float, float], config: MergeConfig) -> Look:
+    """Return the best placement, then its rivals; nothing if there is no placement at all."""
     if len(seen.poses) == 0:
-        return None
+        return seen
     # of what two maps both know, most is free space, but not all
     least_free_m2 = config.verify.min_overlap_m2 / 2
     seen = seen.substantial_first(config.verify.min_matched_wall_m, least_free_m2)
+    best = seen.rows(slice(0, 1))
+    others = seen.rows(slice(1, None)).joined(beside(pair, best.poses, scales, config))
+    return best.followed_by(rivals(best, others, pair, config.verify))
+
+
+def _polished(pair: PairOfMaps, ranked: Look, config: MergeConfig) -> _Found | None:
+    """Return the best placement, aligned to a fraction of a cell, with its figures and its rivals."""
+    if len(ranked.poses) == 0:
+        return None
     target, source = pair.target.map, pair.source.map
-    best = polish(target, source.wall_cells_m, placement_of(seen.poses[0]), config.refine)
+    best = polish(target, source.wall_cells_m, placement_of(ranked.poses[0]), config.refine)
     if not pair.allowed(poses_of([best])).all():
-        best = placement_of(seen.poses[0])
-    near = beside(pair, seen.poses[:1], scales, config)
-    first = replace(seen.rows(slice(0, 1)), poses=poses_of([best]))
-    others = seen.rows(slice(1, None)).joined(near)
-    return _Found(best, verify(target, source, best, config.verify), rivals(first, others, pair, config.verify))
+        best = placement_of(ranked.poses[0])
+    return _Found(best, verify(target, source, best, config.verify), ranked.rows(slice(1, None)))
 
 
-def _is_clear(found: _Found, config: MergeConfig) -> bool:
-    """Tell whether a placement fits so well, and all others so much worse, that there is no need to look further."""
-    scores, limits = found.scores, config.search
-    rival_m = float(found.rivals.scores_m[0]) if len(found.rivals.scores_m) else 0.0
-    return (
-        scores.wall_agreement >= limits.clear_agreement
-        and scores.matched_wall_m >= limits.clear_wall_m
-        and scores.score_m > 0.0
-        and rival_m <= limits.clear_likeness * scores.score_m
+def _is_clear(ranked: Look, config: MergeConfig) -> bool:
+    """Tell whether the best placement fits so well, and all others so much worse, that there is no need to look on."""
+    limits = config.search
+    if len(ranked.poses) == 0 or ranked.scores_m[0] <= 0.0:
+        return False
+    return bool(
+        ranked.shares[0] >= limits.clear_agreement
+        and ranked.matched_m[0] >= limits.clear_wall_m
+        and ranked.scores_m[1:].max(initial=0.0) <= limits.clear_likeness * ranked.scores_m[0]
     )
 
 

@@ -17,6 +17,7 @@ from mapmerge.sim2 import wrap_angle
 
 _SAME_M, _SAME_RAD = 0.3, math.radians(2.0)
 _DISTINCT_SIZE = 0.05
+_ROUNDING = 1e-9
 _BESIDE = 1.2
 _BESIDE_TURNS = 8
 
@@ -61,15 +62,19 @@ class Look:
         order = [int(found[0]), *(row for row in range(len(self.poses)) if row != found[0])]
         return self.rows(order)
 
-    def joined(self, other: Look) -> Look:
-        """Return the placements of both, best first."""
-        both = Look(
+    def followed_by(self, other: Look) -> Look:
+        """Return the placements of this look, then those of the other."""
+        return Look(
             np.vstack([self.poses, other.poses]),
             np.concatenate([self.scores_m, other.scores_m]),
             np.concatenate([self.matched_m, other.matched_m]),
             np.concatenate([self.shares, other.shares]),
             np.concatenate([self.free_m2, other.free_m2]),
         )
+
+    def joined(self, other: Look) -> Look:
+        """Return the placements of both, best first."""
+        both = self.followed_by(other)
         return both.rows(np.argsort(-both.scores_m, kind="stable").tolist())
 
 
@@ -89,7 +94,7 @@ def look(pair: PairOfMaps, starts: Poses, scales: tuple[float, float], config: M
     """
     target, source, limits = pair.target.map, pair.source.map, config.refine
     poses = align(target, evenly(source.walls_m, limits.rough_points), starts, limits.rough_reject_m, scales=scales)
-    poses = poses[pair.allowed(poses)]
+    poses = poses[pair.allowed(poses) & _has_scale(poses, scales)]
     if len(poses) == 0:
         return scored(pair, poses, config)
     few = limits.rough_probes
@@ -97,7 +102,7 @@ def look(pair: PairOfMaps, starts: Poses, scales: tuple[float, float], config: M
     poses = poses[np.argsort(-rough.score_m(config.verify), kind="stable")]
     poses = poses[distinct(poses, source.walls_m, _SAME_M, _SAME_RAD, limits.survivors)]
     poses = align(target, evenly(source.walls_m, limits.points), poses, limits.reject_m, scales=scales)
-    poses = poses[pair.allowed(poses)]
+    poses = poses[pair.allowed(poses) & _has_scale(poses, scales)]
     return scored(pair, poses, config)
 
 
@@ -114,8 +119,13 @@ def beside(pair: PairOfMaps, pose: Poses, scales: tuple[float, float], config: M
     limits = config.refine
     walls_m = evenly(pair.source.map.walls_m, limits.rough_points)
     poses = align(pair.target.map, walls_m, starts, limits.rough_reject_m, scales=scales)
-    poses = poses[pair.allowed(poses)]
+    poses = poses[pair.allowed(poses) & _has_scale(poses, scales)]
     return scored(pair, poses, config)
+
+
+def _has_scale(poses: Poses, scales: tuple[float, float]) -> NDArray[np.bool_]:
+    """Tell which placements have a scale within the limits; where to begin, some may not."""
+    return np.asarray((poses[:, 3] >= scales[0] - _ROUNDING) & (poses[:, 3] <= scales[1] + _ROUNDING), np.bool_)
 
 
 def scored(pair: PairOfMaps, poses: Poses, config: MergeConfig) -> Look:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,6 +61,14 @@ class PairOfMaps:
     source: DescribedMap
     prior: Prior | None = None
     swapped: bool = False
+
+    @property
+    def reach_m(self) -> float:
+        """How far what the maps show lies from the origins of their frames: by so much a turn moves it."""
+        grids = self.target.map.grid, self.source.map.grid
+        return max(math.hypot(grid.map_from_grid.x_m, grid.map_from_grid.y_m) for grid in grids) + max(
+            math.hypot(*self.target.map.extent_m), math.hypot(*self.source.map.extent_m)
+        )
 
     def between_maps(self, target_from_source: Sim2) -> Sim2:
         """Return a placement between grid frames as one between map frames."""

@@ -34,13 +34,17 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig) -
         if found < least:
             message = f"the maps share {_down(found, 1):.1f} {what}, less than {least:g} {unit}"
             return Reason(ReasonCode.TOO_LITTLE_OVERLAP, message)
+    doubt = f"its confidence is {_percent(confidence)}, less than {_percent(config.min_confidence)}"
+    if scores.wall_agreement < config.least_agreement:
+        floor = f"less than {config.least_agreement:.0%}"
+        message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree, {floor}"
+        return Reason(ReasonCode.WALLS_DISAGREE, message)
     if confidence >= config.min_confidence:
         message = (
             f"{scores.overlap_m2:.0f} m² overlap, walls agree {scores.wall_agreement:.2f}, "
             f"next best placement {cues.likeness:.2f} times as good"
         )
         return Reason(ReasonCode.ACCEPTED, message)
-    doubt = f"its confidence is {_percent(confidence)}, less than {_percent(config.min_confidence)}"
     if scores.score_m <= 0.0 or scores.wall_agreement < config.poor_agreement:
         message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree; {doubt}"
         return Reason(ReasonCode.WALLS_DISAGREE, message)
@@ -52,6 +56,12 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig) -
         f"{_down(scores.wall_agreement, 2):.0%} agrees; {doubt}"
     )
     return Reason(ReasonCode.LOW_CONFIDENCE, message)
+
+
+def within(match: Match, prior: Prior) -> Match:
+    """Return a refusal that says that only placements within a prior were looked at."""
+    message = f"within the placement {prior.origin}, {match.reason.message}"
+    return replace(match, reason=Reason(match.reason.code, message))
 
 
 def contradicted(match: Match, elsewhere: Match, prior: Prior, pair: PairOfMaps, config: VerifyConfig) -> Match:
@@ -83,4 +93,4 @@ def _percent(share: float) -> str:
 
 def _down(value: float, digits: int) -> float:
     """Round down, so that what is less than a limit reads like that."""
-    return math.floor(value * 10.0**digits) / 10.0**digits
+    return math.floor(round(value * 10.0**digits, 9)) / 10.0**digits
