@@ -24,8 +24,10 @@ from mapmerge.match.cues import Cues
 
 Array = NDArray[np.float64]
 
-AGAINST = {"far_share", "bend_m", "likeness", "rival_agreement"}
+AGAINST = {"far_share", "bend_m", "likeness"}
 """Cues that speak against a placement; all others speak for it."""
+BY_RULE = "rival_agreement"
+"""A cue that counts by a rule, see `mapmerge.match.confidence.contenders`, and is not fitted."""
 _QUANTILES = (0.02, 0.15, 0.35, 0.6, 0.85, 0.98)
 _KNOTS = {
     "matched_wall_m": (8, 11, 15, 20, 28, 40, 60, 90, 130, 200, 300),
@@ -75,7 +77,7 @@ def fitted(cues: Array, right: NDArray[np.bool_], weights: Array) -> Model:
     ramps = _ramps(cues, knots)
     signs = np.concatenate(
         [
-            np.full(len(item) - 1, -1.0 if cue.name in AGAINST else 1.0)
+            np.full(len(item) - 1, 0.0 if cue.name == BY_RULE else -1.0 if cue.name in AGAINST else 1.0)
             for cue, item in zip(fields(Cues), knots, strict=True)
         ]
     )

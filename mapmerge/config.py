@@ -219,14 +219,14 @@ class VerifyConfig(Settings):
     near_m: float = 0.5
     violation_weight: float = 2.5
     free_weight: float = 0.15
-    min_overlap_m2: float = 10.0
+    min_overlap_m2: float = 6.0
     min_matched_wall_m: float = 8.0
     min_acceptance: float = 0.95
     least_agreement: float = 0.7
     poor_agreement: float = 0.8
     rival_likeness: float = 0.5
     clearly_worse: float = 0.85
-    min_confidence: float = 0.999
+    min_confidence: float = 0.99
     witness_confidence: float = 0.9
     nearly_sure_confidence: float = 0.99
     hopeful_confidence: float = 0.05

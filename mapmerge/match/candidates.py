@@ -39,6 +39,16 @@ def by_spectra(pair: PairOfMaps, rotations: Sequence[float], scales: Sequence[fl
     return _correlated(pair, turns, config.cell_m, config.free_weights, config.shifts, most, config)
 
 
+def by_half_turn(pair: PairOfMaps, pose: Sim2, config: SearchConfig) -> Poses:
+    """Return the best shifts at the rotation of a placement and turned by 180° from it.
+
+    Where a building is symmetric, the best placement may be its other half: the right one then shares less.
+    """
+    turns = [Sim2(0.0, 0.0, pose.yaw_rad, pose.scale)]
+    weights = config.free_weights[-1:]
+    return _correlated(pair, turns, config.cell_m, weights, 2 * config.shifts, 4 * config.shifts, config)
+
+
 def by_sweep(pair: PairOfMaps, config: SearchConfig) -> Poses:
     """Return the shifts at which walls and free space agree best, of all rotations.
 

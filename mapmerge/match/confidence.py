@@ -15,9 +15,8 @@ from mapmerge.match.calibration import CURVES, INTERCEPT
 from mapmerge.match.cues import Cues
 
 _ALIKE, _AS_GOOD = 0.85, 0.98
-_FITS_BETTER = 0.03
 _MOST_LOG_ODDS = 50.0
-_CONTESTED, _AS_CONTESTED = 0.4, 0.55
+_FITS_WORSE, _FITS_AS_WELL = -0.03, -0.02
 
 HIGHEST = 0.9999
 """No placement is called surer: what is seldomer than 1 in 10 000 was not measured."""
@@ -67,12 +66,13 @@ def confidence(cues: Cues, tries: float = 1.0) -> float:
 def contenders(cues: Cues) -> float:
     """Return among how many placements the choice is, from 1 to 2, which no sum of cues may outweigh.
 
-    Of two placements that are as good only one is right. Nor can the better one be told where the walls of the other,
-    over a good part of the length, agree better: so look the two halves of a symmetric building.
+    Of two placements that are as good only one is right. Nor can the better one be told where walls agree as well at
+    the other over a good part of the length: so look the halves of a symmetric building, of which the one that lets the
+    maps overlap more is not the likelier one.
     """
     as_good = _ramp(cues.likeness, _ALIKE, _AS_GOOD)
-    fits_better = _ramp(cues.rival_agreement - cues.wall_agreement, 0.0, _FITS_BETTER)
-    return 1.0 + max(as_good, _ramp(fits_better * cues.likeness, _CONTESTED, _AS_CONTESTED))
+    fits_as_well = _ramp(cues.rival_agreement - cues.wall_agreement, _FITS_WORSE, _FITS_AS_WELL)
+    return 1.0 + max(as_good, fits_as_well)
 
 
 def _ramp(value: float, low: float, high: float) -> float:

@@ -23,7 +23,7 @@ from mapmerge.config import MergeConfig
 from mapmerge.evidence import Curve, CurvesEvidence, Evidence, OverlayEvidence, SurfaceEvidence
 from mapmerge.grid import Grid
 from mapmerge.match.base import Match, Rival
-from mapmerge.match.candidates import all_scales, by_prior, by_spectra, by_sweep, likely_rotations
+from mapmerge.match.candidates import all_scales, by_half_turn, by_prior, by_spectra, by_sweep, likely_rotations
 from mapmerge.match.confidence import confidence
 from mapmerge.match.cues import cues_of
 from mapmerge.match.look import Look, beside, look, rivals
@@ -156,7 +156,9 @@ def _ranked(pair: PairOfMaps, seen: Look, scales: tuple[float, float], config: M
     least_free_m2 = config.verify.min_overlap_m2 / 2
     seen = seen.substantial_first(config.verify.min_matched_wall_m, least_free_m2)
     best = seen.rows(slice(0, 1))
-    others = seen.rows(slice(1, None)).joined(beside(pair, best.poses, scales, config))
+    near = beside(pair, best.poses, scales, config)
+    turned = look(pair, by_half_turn(pair, placement_of(best.poses[0]), config.search), scales, config)
+    others = seen.rows(slice(1, None)).joined(near).joined(turned)
     return best.followed_by(rivals(best, others, pair, config.verify))
 
 

@@ -18,7 +18,7 @@ from mapmerge.score import agreement, probe
 from mapmerge.sim2 import Sim2
 from mapmerge.verify import Scores
 
-_SUBSTANTIAL = 0.3
+_SUBSTANTIAL, _SUBSTANTIAL_FREE_M2 = 0.25, 3.0
 _LEAST_SHARE = 0.05
 
 
@@ -45,7 +45,8 @@ class Cues:
     clearance
         Logarithm of the lead over the wall that contradicts the placement even if the maps may bend, 1 m added to each.
     rival_agreement
-        Largest wall agreement of rivals that match a good part of the wall that the placement does; 0 if none does.
+        Largest wall agreement of rivals that match a good part of the wall that the placement does, with some free
+        space in common; 0 if none does.
     acceptance
         Acceptance index ω.
     overlap_m2, overlap_fraction
@@ -85,7 +86,8 @@ def cues_of(pair: PairOfMaps, target_from_source: Sim2, scores: Scores, rivals: 
     judged_m = sum(float(tally.matched_m[0] + tally.violated_m[0]) for tally in (found.ahead, found.back))
     far_m = float(found.ahead.far_m[0] + found.back.far_m[0])
     rival_m = max(0.0, float(rivals.scores_m[0])) if len(rivals.scores_m) else 0.0
-    substantial = rivals.matched_m >= max(config.verify.min_matched_wall_m, _SUBSTANTIAL * scores.matched_wall_m)
+    least_m = max(config.verify.min_matched_wall_m, _SUBSTANTIAL * scores.matched_wall_m)
+    substantial = (rivals.matched_m >= least_m) & (rivals.free_m2 >= _SUBSTANTIAL_FREE_M2)
     aligned, held_m, tight_share = _fit(target, source, pose, config.verify)
     bent = slack(target, source, target_from_source, config.slack)
     lead_m = max(0.0, scores.score_m - rival_m)

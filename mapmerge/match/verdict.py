@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from mapmerge.config import VerifyConfig
 from mapmerge.match.base import Match, Rival
+from mapmerge.match.confidence import contenders
 from mapmerge.match.cues import Cues
 from mapmerge.match.pair import DescribedMap, PairOfMaps
 from mapmerge.prior import Prior
@@ -50,6 +51,9 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig) -
         return Reason(ReasonCode.WALLS_DISAGREE, message)
     if cues.likeness > config.rival_likeness:
         message = f"another placement is {cues.likeness:.2f} times as good as the best one; {doubt}"
+        return Reason(ReasonCode.AMBIGUOUS, message)
+    if contenders(cues) > 1.0:
+        message = f"at another placement, with less overlap, walls agree as well ({cues.rival_agreement:.2f}); {doubt}"
         return Reason(ReasonCode.AMBIGUOUS, message)
     message = (
         f"only {scores.overlap_m2:.0f} m² overlap with {scores.matched_wall_m:.0f} m of wall, of which "
