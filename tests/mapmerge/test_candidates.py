@@ -7,7 +7,7 @@ import pytest
 
 from mapmerge.align import placement_of
 from mapmerge.config import SearchConfig
-from mapmerge.match.candidates import all_scales, by_prior, by_spectra, by_sweep, likely_rotations
+from mapmerge.match.candidates import all_scales, by_half_turn, by_prior, by_spectra, by_sweep, likely_rotations
 from mapmerge.prior import Prior
 from mapmerge.sim2 import Sim2
 from tests.floors import BESIDE_THE_FLAT, FLAT_M, errors, filled, flat, pair_of_maps, with_another_label
@@ -48,6 +48,15 @@ class TestTruth:
         found = by_sweep(pair, SEARCH)
         assert len(found) <= 2 * SEARCH.max_candidates * len(SEARCH.sweep_free_weights)
         assert least_error_m(found, truth, at_m) < 0.5
+
+    def test_is_among_those_turned_by_half_from_the_other_half(self, place):
+        """Wherever that lies: of a symmetric building the wrong half may seem the better one."""
+        pair, truth, at_m = known_pair(place)
+        elsewhere = Sim2(5.0, -3.0, truth.yaw_rad + math.pi)
+        found = by_half_turn(pair, elsewhere, SEARCH)
+        assert least_error_m(found, truth, at_m) < 0.3
+        turns = np.remainder(found[:, 2] - truth.yaw_rad, math.pi)
+        assert np.minimum(turns, math.pi - turns).max() < 1e-6
 
     @pytest.mark.parametrize("factor", [0.7, 1.6])
     def test_is_among_those_of_all_scales(self, place, factor):

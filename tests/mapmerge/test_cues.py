@@ -8,8 +8,8 @@ import pytest
 
 from mapmerge.align import poses_of
 from mapmerge.config import MergeConfig
-from mapmerge.match.confidence import confidence
-from mapmerge.match.cues import Cues, cues_of
+from mapmerge.match.confidence import HIGHEST, confidence, contenders
+from mapmerge.match.cues import Cues, clearance, cues_of
 from mapmerge.match.look import Look
 from mapmerge.sim2 import Sim2
 from mapmerge.verify import verify
@@ -120,3 +120,54 @@ def test_a_rival_that_is_as_good_leaves_an_even_chance():
     """However much wall agrees, such as at a corridor whose rooms nobody can tell apart."""
     alone = cues(FLATS)
     assert confidence(replace(alone, likeness=1.0, lead_m=0.0, rival_agreement=1.0)) <= 0.5
+
+
+class TestClearance:
+    def test_is_of_the_lead_over_what_contradicts(self):
+        found = cues(FLATS)
+        assert found.clearance == clearance(found.lead_m, found.matched_wall_m, found.slack_agreement)
+        assert clearance(9.0, 30.0, 1.0) == pytest.approx(math.log(10.0))
+        assert clearance(9.0, 30.0, 0.75) == pytest.approx(math.log(10.0 / 11.0))
+        assert clearance(0.0, 0.0, 1.0) == 0.0
+
+    @pytest.mark.parametrize("slack_agreement", [0.0, 1e-9, 0.5, 1.0])
+    def test_is_finite_and_falls_with_what_contradicts(self, slack_agreement):
+        found = clearance(5.0, 40.0, slack_agreement)
+        assert math.isfinite(found)
+        assert found <= clearance(5.0, 40.0, min(1.0, slack_agreement + 0.1))
+
+
+class TestContenders:
+    """Among how many placements the choice is."""
+
+    @pytest.mark.parametrize(
+        ("change", "count"),
+        [
+            ({}, 1.0),
+            ({"likeness": 0.85}, 1.0),
+            ({"likeness": 0.98}, 2.0),
+            ({"likeness": 1.0}, 2.0),
+            ({"wall_agreement": 0.9, "rival_agreement": 0.86}, 1.0),
+            ({"wall_agreement": 0.9, "rival_agreement": 0.9}, 2.0),
+            ({"wall_agreement": 0.9, "rival_agreement": 0.95, "likeness": 0.99}, 2.0),
+        ],
+    )
+    def test_are_one_or_two_where_a_rival_is_as_good_or_fits_as_well(self, change, count):
+        alone = replace(cues(FLATS), likeness=0.0, rival_agreement=0.0)
+        assert contenders(replace(alone, **change)) == pytest.approx(count)
+
+    def test_a_smaller_rival_whose_walls_agree_as_well_leaves_an_even_chance(self):
+        alone = cues(FLATS)
+        assert confidence(alone) > 0.999
+        assert confidence(replace(alone, rival_agreement=1.0)) <= 0.5
+
+
+def test_no_placement_is_surer_than_was_measured():
+    assert confidence(replace(cues(FLATS), lead_m=1e3, clearance=9.0, overlap_m2=1e3)) <= HIGHEST < 1.0
+
+
+def test_the_best_of_many_searches_is_less_sure():
+    found = replace(cues(FLATS), overlap_m2=6.0, clearance=1.5)
+    doubts = [1.0 - confidence(found, tries) for tries in (1.0, 5.0, 20.0, 1e9)]
+    assert 1.0 - HIGHEST < doubts[0] < 0.05
+    assert doubts == pytest.approx([doubts[0], 5 * doubts[0], 20 * doubts[0], 1.0])
