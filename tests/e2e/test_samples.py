@@ -51,9 +51,9 @@ def test_a_restart_in_the_middle(replay: Program) -> None:
             assert error_m <= 0.20
             assert error_deg <= 1.5
     assert any(pose for time_ns, pose in places if time_ns < restart_ns)
-    assert [(change["event"], change["stamp_ns"] > restart_ns) for change in ran.report["history"]] == [
-        ("placed", False),
-        ("moved", True),
-    ]
+    events = [(change["event"], change["stamp_ns"] > restart_ns) for change in ran.report["history"]]
+    assert events[0] == ("placed", False)
+    assert {event for event, _ in events[1:]} == {"moved"}
+    assert [event for event, is_after in events if is_after] == ["moved"]
     assert [robot["map_frame"] for robot in ran.robots.values()] == ["alpha/map", "bravo/map"]
     assert [item["clocks"] for item in ran.report["inputs"]] == [{"/map": "header"}] * 2
