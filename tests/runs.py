@@ -102,8 +102,8 @@ def linked(
 
 
 def growing(robot: str, first_s: float = 0.0, **options: Any) -> list[Recorded]:
-    """Return a robot's three maps, ten seconds apart."""
-    shares_m = (4.5, 7.0, 9.0)
+    """Return a robot's three maps, ten seconds apart, the first too small to be placed by."""
+    shares_m = (1.0, 7.0, 9.0)
     return [
         seen(robot, first_s + 10.0 * index, flat_map(robot, east_m), **options) for index, east_m in enumerate(shares_m)
     ]

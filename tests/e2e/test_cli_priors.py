@@ -323,7 +323,7 @@ class TestOtherSettings:
     def test_no_probability(self, replay: Program, two: Path, value: str) -> None:
         ran = replay.merge(two, "--min-confidence", value)
         assert ran.status == 2
-        assert f"--min-confidence {value}: expected a probability between 0 and 1, such as 0.999" in ran.error
+        assert f"--min-confidence {value}: expected a probability between 0 and 1, such as 0.99" in ran.error
 
     def test_no_method(self, replay: Program, two: Path) -> None:
         ran = replay.merge(two, "--method", "magic")

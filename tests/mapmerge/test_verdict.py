@@ -35,6 +35,7 @@ CUES = Cues(
     bend_m=0.05,
     likeness=0.2,
     lead_m=48.0,
+    clearance=3.0,
     rival_agreement=0.4,
     acceptance=0.98,
     overlap_m2=40.0,
@@ -54,7 +55,7 @@ class TestJudge:
     @pytest.mark.parametrize(
         ("change", "code", "says"),
         [
-            ({"overlap_m2": 9.9}, ReasonCode.TOO_LITTLE_OVERLAP, "9.9 m²"),
+            ({"overlap_m2": 5.9}, ReasonCode.TOO_LITTLE_OVERLAP, "5.9 m²"),
             ({"matched_wall_m": 7.9}, ReasonCode.TOO_LITTLE_OVERLAP, "7.9 m of wall"),
         ],
     )
@@ -68,6 +69,7 @@ class TestJudge:
         ("scores", "cues", "code", "says"),
         [
             ({"wall_agreement": 0.7}, {}, ReasonCode.WALLS_DISAGREE, "70%"),
+            ({"wall_agreement": 0.79}, {}, ReasonCode.WALLS_DISAGREE, "79%"),
             ({"score_m": -3.0}, {}, ReasonCode.WALLS_DISAGREE, "95%"),
             ({"wall_agreement": 0.7}, {"likeness": 0.9}, ReasonCode.WALLS_DISAGREE, "70%"),
             ({}, {"likeness": 0.9}, ReasonCode.AMBIGUOUS, "0.90 times"),
@@ -80,17 +82,28 @@ class TestJudge:
         assert says in reason.message
         assert "42 %" in reason.message
 
-    @pytest.mark.parametrize("exactly", [{"overlap_m2": 10.0}, {"matched_wall_m": 8.0}])
+    @pytest.mark.parametrize("exactly", [{"overlap_m2": 6.0}, {"matched_wall_m": 8.0}, {"wall_agreement": 0.7}])
     def test_the_limits_themselves_pass(self, exactly):
         assert judge(replace(GOOD, **exactly), CUES, SURE, LIMITS).code is ReasonCode.ACCEPTED
 
-    def test_only_the_confidence_decides_over_what_is_large_enough(self):
-        poor = replace(GOOD, wall_agreement=0.5), replace(CUES, likeness=0.99)
+    def test_only_the_confidence_decides_over_what_is_large_enough_and_not_hopeless(self):
+        poor = replace(GOOD, wall_agreement=0.71), replace(CUES, likeness=0.99, rival_agreement=0.9)
         assert judge(*poor, SURE, LIMITS).code is ReasonCode.ACCEPTED
 
-    @pytest.mark.parametrize("change", [{"overlap_m2": 9.97}, {"matched_wall_m": 7.999}])
+    @pytest.mark.parametrize("confidence", [0.1, 1.0])
+    def test_walls_most_of_which_disagree_are_never_accepted(self, confidence):
+        reason = judge(replace(GOOD, wall_agreement=0.699), CUES, confidence, LIMITS)
+        assert reason.code is ReasonCode.WALLS_DISAGREE
+        assert "69% agree, less than 70%" in reason.message
+
+    def test_a_rival_whose_walls_agree_as_well_contests_it_however_much_less_it_scores(self):
+        reason = judge(GOOD, replace(CUES, rival_agreement=0.96), 0.5, LIMITS)
+        assert reason.code is ReasonCode.AMBIGUOUS
+        assert "0.96" in reason.message
+
+    @pytest.mark.parametrize("change", [{"overlap_m2": 5.97}, {"matched_wall_m": 7.999}])
     def test_a_near_miss_does_not_read_like_a_contradiction(self, change):
-        """Not "the maps share 10.0 m² of ground, less than 10 m²"."""
+        """Not "the maps share 6.0 m² of ground, less than 6 m²"."""
         message = judge(replace(GOOD, **change), CUES, 1.0, LIMITS).message
         found, least = map(float, re.findall(r"\d+(?:\.\d+)?", message))
         assert found < least

@@ -16,7 +16,7 @@ from tests.runs import bare_room, flat_map
 STEPS = ["orientation_spectra", "correlation_surface", "overlay"]
 RUN: tuple[Mapping[str, Grid], ...] = (
     {"r1": flat_map("r1")},
-    {"r2": flat_map("r2", 4.5)},
+    {"r2": flat_map("r2", 1.0)},
     {"r1": flat_map("r1")},
     {"r2": flat_map("r2")},
     {"r3": flat_map("r3")},

@@ -73,7 +73,7 @@ def test_before_any_map() -> None:
 
 
 def test_a_run() -> None:
-    waiting, alone, merged = reported({"r2": flat_map("r2")}, {"r1": flat_map("r1", 2.0)}, {"r1": flat_map("r1")})
+    waiting, alone, merged = reported({"r2": flat_map("r2")}, {"r1": flat_map("r1", 1.0)}, {"r1": flat_map("r1")})
     assert waiting["robots"]["r2"]["status"] == "unmerged"
     assert waiting["robots"]["r2"]["reason"]["code"] == "no_reference_map"
     assert waiting["robots"]["r2"]["component"] == "r2"

@@ -71,7 +71,7 @@ def events_of(
 def story() -> list[Event]:
     """A stranger beside two robots of which one is placed, withdrawn and placed again; a fourth says nothing."""
     ticks = {
-        STAMPS[0]: {"r2": flat_map("r2", 4.5)},
+        STAMPS[0]: {"r2": flat_map("r2", 1.0)},
         STAMPS[1]: {"r1": flat_map("r1"), STRANGER: bare_room()},
         STAMPS[2]: {"r2": flat_map("r2")},
         STAMPS[3]: {"r2": flat_map("r2")},
