@@ -44,6 +44,7 @@ _KNOTS = {
 """Where curves bend; those of other cues at quantiles of what was seen."""
 _PENALTY = 3e-5
 _STEPS = 9000
+_LINE = 120
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,7 +132,11 @@ def source_of(model: Model) -> str:
     for cue, knots, rises in zip(fields(Cues), model.knots, model.rises, strict=True):
         at, up = (", ".join(f"{value:.4f}" for value in values) for values in (knots, rises))
         comma = "," if len(rises) == 1 else ""
-        lines.append(f'    "{cue.name}": (({at}), ({up}{comma})),')
+        line = f'    "{cue.name}": (({at}), ({up}{comma})),'
+        is_long = len(line) > _LINE
+        lines += (
+            [f'    "{cue.name}": (', f"        ({at}),", f"        ({up}{comma}),", "    ),"] if is_long else [line]
+        )
     return "\n".join(
         [*lines, "}", '"""Knots of each cue, and what is added to the log odds from each to the next."""', ""]
     )

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
-from mapmerge.config import MergeConfig
+from mapmerge.config import MergeConfig, VerifyConfig
 from mapmerge.fuse import Layer, fuse
 from mapmerge.graph import Forest
 from mapmerge.grid import Grid
@@ -120,11 +120,7 @@ def agreed(
         Accepted, if they are sure enough together; None if fewer than two count.
     """
     limits = config.verify
-    counted = [
-        pair
-        for pair in between
-        if matches[pair].reason.code in _UNCONTESTED and (matches[pair].confidence or 0.0) >= limits.witness_confidence
-    ]
+    counted = [pair for pair in between if _may_witness(matches[pair], limits)]
     if len(counted) < 2:
         return None
     best, *others = sorted(counted, key=lambda pair: _surety(matches[pair]), reverse=True)
@@ -139,6 +135,16 @@ def agreed(
     message = f"{witnesses} pairs of maps agree where {best[1]} lies on {best[0]}; by itself, {match.reason.message}"
     return best, replace(
         match, accepted=True, confidence=min(1.0 - doubt, HIGHEST), reason=Reason(ReasonCode.ACCEPTED, message)
+    )
+
+
+def _may_witness(match: Match, limits: VerifyConfig) -> bool:
+    """Tell whether a refused match has no rival, is nearly sure, and lacks nothing that every match must have."""
+    return (
+        match.reason.code in _UNCONTESTED
+        and (match.confidence or 0.0) >= limits.witness_confidence
+        and match.scores is not None
+        and match.scores.wall_agreement >= limits.least_agreement
     )
 
 
@@ -181,11 +187,21 @@ def _places(robots: Robots, forest: Forest) -> Placed:
 
 
 def _merged(robots: Robots, forest: Forest, grids: Mapping[str, Grid], config: MergeConfig) -> Grid:
-    """Return the merged map of linked robots, in the map frame of the first."""
+    """Return the merged map of linked robots, in the map frame of the first, on the cells of the one that knows most.
+
+    So the cells, and what is found with them, do not depend on the order of the robots.
+    """
     if len(robots) == 1:
         return grids[robots[0]]
-    layers = [Layer(grids[robot], forest.placements[robot].component_from_map) for robot in robots]
-    return fuse(layers, grids[robots[0]], config.cells).grid
+    base = max(robots, key=lambda robot: (grids[robot].known_area_m2, robot))
+    component_from_base = forest.placements[base].component_from_map
+    base_from_component = component_from_base.inverse()
+    layers = [
+        Layer(grids[robot], base_from_component @ forest.placements[robot].component_from_map)
+        for robot in sorted(robots)
+    ]
+    merged = fuse(layers, grids[base], config.cells).grid
+    return Grid(merged.cells, merged.resolution_m, component_from_base @ merged.map_from_grid)
 
 
 def _matched(target: Grid, source: Grid, matcher: Matcher[Any], config: MergeConfig) -> Match:

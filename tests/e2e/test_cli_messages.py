@@ -229,7 +229,7 @@ class TestRestart:
         messages = [
             seen("r1", 0.0),
             seen("r2", 1.0),
-            seen("r2", 2.0, begun_anew(flat_map("r2", 2.0))),
+            seen("r2", 2.0, begun_anew(flat_map("r2", 1.0))),
             seen("r2", 3.0, begun_anew(flat_map("r2"))),
         ]
         ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages))
@@ -299,7 +299,7 @@ class TestUnplaced:
         assert list(transforms(ran.mcap))[-1][1].keys() == {"r1/map", "r2/map"}
 
     def test_shows_its_best_refused_candidate(self, replay: Program, tmp_path: Path) -> None:
-        messages = [seen("r1", 0.0, flat_map("r1", 3.0)), seen("r2", 1.0)]
+        messages = [seen("r1", 0.0, flat_map("r1", 1.0)), seen("r2", 1.0)]
         ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages), images="changed")
         (pair,) = ran.report["pairs"]
         found = ran.robots["r2"]

@@ -23,7 +23,7 @@ def lagging(robot: str, lag_s: float, **options: Any) -> list[Recorded]:
     """Return a robot's maps, whose headers are older than the log."""
     return [
         seen(robot, seconds, flat_map(robot, east_m), stamp_ns=at(seconds - lag_s), **options)
-        for seconds, east_m in ((0.0, 4.5), (10.0, 7.0), (20.0, 9.0))
+        for seconds, east_m in ((0.0, 1.0), (10.0, 7.0), (20.0, 9.0))
     ]
 
 
@@ -45,7 +45,7 @@ class TestClock:
 
     def test_it_is_chosen_by_the_first_message(self, replay: Program, tmp_path: Path) -> None:
         first, *rest = lagging("r1", 1.0)
-        messages = in_log_order([seen("r1", 0.0, flat_map("r1", 4.5), stamp_ns=0), *rest], growing("r2", 2.0))
+        messages = in_log_order([seen("r1", 0.0, flat_map("r1", 1.0), stamp_ns=0), *rest], growing("r2", 2.0))
         ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages))
         assert ran.report["inputs"][0]["clocks"]["/r1/map"] == "log"
         assert first.log_time_ns == at(ticks_s(ran)[0])
@@ -165,7 +165,7 @@ class TestOtherClocks:
     def simulated(robot: str, first_s: float = 3.0, **options: Any) -> list[Recorded]:
         return [
             seen(robot, seconds, flat_map(robot, east_m), stamp_ns=round((first_s + seconds) * SECOND), **options)
-            for seconds, east_m in ((0.0, 4.5), (10.0, 7.0), (20.0, 9.0))
+            for seconds, east_m in ((0.0, 1.0), (10.0, 7.0), (20.0, 9.0))
         ]
 
     @pytest.fixture

@@ -6,9 +6,9 @@ import pytest
 
 from mapmerge.sim2 import Sim2
 from tests.data_paths import ROOT
+from tests.floors import errors
 from tests.outputs import reports
 from tests.program import Program, started
-from tests.runs import is_right
 from tests.truth import check, read_truth
 
 SAMPLES = ROOT / "samples"
@@ -44,7 +44,12 @@ def test_a_restart_in_the_middle(replay: Program) -> None:
     for time_ns, pose in places:
         truth = before if time_ns < restart_ns else known
         true = Sim2(truth["x_m"], truth["y_m"], truth["yaw_rad"])
-        assert pose is None or is_right(pose, true, tuple(truth["overlap_centre_m"]))
+        if pose:
+            # a turn is less certain where the maps share little yet
+            found = Sim2(pose["x_m"], pose["y_m"], pose["yaw_rad"], pose["scale"])
+            error_m, error_deg = errors(found, true, tuple(truth["overlap_centre_m"]))
+            assert error_m <= 0.20
+            assert error_deg <= 1.5
     assert any(pose for time_ns, pose in places if time_ns < restart_ns)
     assert [(change["event"], change["stamp_ns"] > restart_ns) for change in ran.report["history"]] == [
         ("placed", False),

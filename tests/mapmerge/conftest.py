@@ -1,6 +1,7 @@
 """A matcher whose answers a test decides."""
 
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,12 +11,12 @@ from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.match import MATCHERS, Match
 from mapmerge.reasons import Reason, ReasonCode
-from mapmerge.sim2 import IDENTITY, Sim2
+from mapmerge.sim2 import IDENTITY
 from mapmerge.verify import Scores
 
 
 class ScriptedMatcher:
-    """Knows maps by the value that fills them, and counts what it is asked."""
+    """Knows maps by the value that fills them, merged maps by the values of all, and counts what it is asked."""
 
     config = MergeConfig(method="scripted")
 
@@ -34,17 +35,29 @@ class ScriptedMatcher:
         scores = self.scores(score_m)
         self.answers[target, source] = Match(pose, scores, True, reason, confidence, weight=weight)
 
-    def misfits(self, target, source, score_m=5.0, code=ReasonCode.WALLS_DISAGREE):
+    def misfits(
+        self,
+        target,
+        source,
+        score_m=5.0,
+        code=ReasonCode.WALLS_DISAGREE,
+        pose=IDENTITY,
+        confidence=None,
+        wall_agreement=0.9,
+        evidence=(),
+    ):
         reason = Reason(code, f"{source} does not fit {target}")
-        self.answers[target, source] = Match(Sim2(), self.scores(score_m), accepted=False, reason=reason)
+        scores = replace(self.scores(score_m), wall_agreement=wall_agreement)
+        self.answers[target, source] = Match(pose, scores, False, reason, confidence, evidence=evidence)
 
     @staticmethod
     def scores(score_m):
-        return Scores(score_m, 0.5, 20.0, 0.25, 0.5, 10.0, 10.0)
+        return Scores(score_m, 0.5, 20.0, 0.25, 0.9, 10.0, 10.0)
 
     def prepare(self, grid, resolution_m, config):
         assert config is self.config
-        self.prepared.append((int(grid.cells[0, 0]), resolution_m))
+        values = np.unique(grid.cells[grid.known]).tolist()
+        self.prepared.append((values[0] if len(values) == 1 else tuple(values), resolution_m))
         return self.prepared[-1]
 
     def match(self, target, source, config, prior=None):

@@ -68,7 +68,8 @@ class TestPrior:
         found = by_prior(pair, SEARCH)
         assert errors(placement_of(found[0]), pair.believed, at_m) == pytest.approx((0.0, 0.0), abs=1e-9)
         assert least_error_m(found[1:], truth, at_m) < 0.4
-        assert pair.allowed(found, 0.8, math.radians(3.0)).all()
+        turn_rad = math.radians(3.0)  # which shifts what is far from the middle
+        assert pair.allowed(found, 0.8 + turn_rad * pair.reach_m, turn_rad).all()
 
     def test_without_one_there_is_nothing_to_look_near_to(self):
         pair, _, _ = known_pair(Sim2())
