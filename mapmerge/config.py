@@ -226,9 +226,9 @@ class VerifyConfig(Settings):
     poor_agreement: float = 0.8
     rival_likeness: float = 0.5
     clearly_worse: float = 0.85
-    min_confidence: float = 0.99
-    witness_confidence: float = 0.9
-    nearly_sure_confidence: float = 0.99
+    min_confidence: float = 0.98
+    witness_confidence: float = 0.8
+    nearly_sure_confidence: float = 0.97
     hopeful_confidence: float = 0.05
     distinct_m: float = 0.75
     distinct_rad: float = math.radians(5.0)

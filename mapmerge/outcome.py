@@ -167,14 +167,19 @@ def _partner(robot: str, pairs: Mapping[Pair, Match]) -> str:
 def _best_refused(reference: str, robot: str, pairs: Mapping[Pair, Match]) -> Pair | None:
     """Return the refused pair of this robot that says most.
 
-    That is one whose maps contradict what was believed, for there somebody was wrong; else the one with the highest
-    score, the reference before others.
+    That is one whose maps contradict what was believed, for there somebody was wrong; else one whose maps have ground
+    in common, the surest, the one with the highest score, the reference before others.
     """
 
-    def rank(pair: Pair) -> tuple[bool, float, bool]:
+    def rank(pair: Pair) -> tuple[bool, bool, float, float, bool]:
         match = pairs[pair]
-        contradicted = match.reason.code is ReasonCode.PRIOR_CONTRADICTED
-        return (contradicted, match.scores.score_m if match.scores else float("-inf"), reference in pair)
+        return (
+            match.reason.code is ReasonCode.PRIOR_CONTRADICTED,
+            match.scores is not None and match.reason.code is not ReasonCode.TOO_LITTLE_OVERLAP,
+            round(match.confidence or 0.0, 2),
+            match.scores.score_m if match.scores else float("-inf"),
+            reference in pair,
+        )
 
     refused = [pair for pair, match in pairs.items() if robot in pair and not match.accepted]
     return max(refused, key=rank, default=None)

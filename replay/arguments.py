@@ -143,7 +143,7 @@ def _placing_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--min-confidence",
         metavar="P",
-        default="0.99",
+        default="0.98",
         help="least probability that a placement is right (default: %(default)s, of which, as measured on simulated "
         "and recorded maps of other buildings, at most 1 accepted in 1000 is wrong); the methods existing and paper "
         "state none and ignore it",

@@ -17,7 +17,7 @@ DEFAULT_SIGMA_YAW_RAD = math.radians(10.0)
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _ANGLE = rf"({_NUMBER})(deg|°|)"
-_VALUES = re.compile(rf"({_NUMBER}),({_NUMBER}),{_ANGLE}(?:,?±({_NUMBER}),?±({_NUMBER}),?±{_ANGLE})?")
+_VALUES = re.compile(rf"({_NUMBER}),({_NUMBER}),{_ANGLE}(?:,?±({_NUMBER})(?:,±?|±)({_NUMBER})(?:,±?|±){_ANGLE})?")
 _EXPECTED = (
     f"expected {FORM} in metres and radians, such as r2=4.5,-1.2,1.57, or with degrees and standard deviations "
     "r2=4.5,-1.2,90deg+-0.5,+-0.5,+-5deg"

@@ -8,13 +8,16 @@ from typing import Any
 from mapmerge.errors import ConfigError
 from mapmerge.match.base import Match, Matcher, Rival
 
-__all__ = ["MATCHERS", "Match", "Matcher", "Rival", "load_matcher"]
+__all__ = ["CALIBRATED", "MATCHERS", "Match", "Matcher", "Rival", "load_matcher"]
 
 MATCHERS: dict[str, str] = {
     "correlation": "mapmerge.match.correlation:CorrelationMatcher",
     "existing": "mapmerge.match.existing:ExistingMatcher",
     "paper": "mapmerge.match.paper:PaperMatcher",
 }
+
+CALIBRATED = frozenset({"correlation"})
+"""Methods that state a confidence, and accept by it; the others accept by the acceptance index."""
 
 
 def load_matcher(name: str) -> Matcher[Any]:

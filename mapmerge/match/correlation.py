@@ -91,7 +91,19 @@ def _held_against(match: Match, elsewhere: Match, pair: PairOfMaps, config: Merg
 def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
     """Return where the source of the pair lies on its target."""
     rotations = likely_rotations(pair, config.search)
-    found = _search(pair, rotations, config)
+    ranked = _search(pair, rotations, config)
+    match = _judged(pair, ranked, rotations, config)
+    if match.reason.code is ReasonCode.TOO_LITTLE_OVERLAP:
+        # of what two maps both know, most is free space, but not all
+        least_free_m2 = config.verify.min_overlap_m2 / 2
+        telling = ranked.substantial_first(config.verify.min_matched_wall_m, least_free_m2)
+        return match if telling is ranked else _judged(pair, telling, rotations, config)
+    return match
+
+
+def _judged(pair: PairOfMaps, ranked: Look, rotations: tuple[float, ...], config: MergeConfig) -> Match:
+    """Return what is said of the first of the ranked placements."""
+    found = _polished(pair, ranked, config)
     if found is None:
         reason = Reason(ReasonCode.NO_CANDIDATE, "no placement lets walls of the two maps coincide")
         return Match(None, None, accepted=False, reason=reason, evidence=(_spectra(pair, rotations),))
@@ -123,20 +135,20 @@ def _tries(config: MergeConfig) -> float:
     return 1.0 if config.scale == "metadata" else 1.0 + math.log(largest / least) / config.search.distinct_scale
 
 
-def _search(pair: PairOfMaps, rotations: tuple[float, ...], config: MergeConfig) -> _Found | None:
+def _search(pair: PairOfMaps, rotations: tuple[float, ...], config: MergeConfig) -> Look:
     """Return the best placement and its rivals, after a second look if the first one is not clear."""
     scales, steps = _scales(pair, config)
     if pair.prior is not None:
         starts = by_prior(pair, config.search)
         if steps != (1.0,):
             starts = np.vstack([starts, by_spectra(pair, rotations, steps, config.search)])
-        return _polished(pair, _ranked(pair, look(pair, starts, scales, config), scales, config), config)
+        return _ranked(pair, look(pair, starts, scales, config), scales, config)
     seen = look(pair, by_spectra(pair, rotations, steps, config.search), scales, config)
     ranked = _ranked(pair, seen, scales, config)
     if not _is_clear(ranked, config) and scales[0] <= 1.0 <= scales[1]:
         again = look(pair, by_sweep(pair, config.search), scales, config)
         ranked = _ranked(pair, seen.joined(again), scales, config)
-    return _polished(pair, ranked, config)
+    return ranked
 
 
 def _scales(pair: PairOfMaps, config: MergeConfig) -> tuple[tuple[float, float], tuple[float, ...]]:
@@ -152,9 +164,6 @@ def _ranked(pair: PairOfMaps, seen: Look, scales: tuple[float, float], config: M
     """Return the best placement, then its rivals; nothing if there is no placement at all."""
     if len(seen.poses) == 0:
         return seen
-    # of what two maps both know, most is free space, but not all
-    least_free_m2 = config.verify.min_overlap_m2 / 2
-    seen = seen.substantial_first(config.verify.min_matched_wall_m, least_free_m2)
     best = seen.rows(slice(0, 1))
     near = beside(pair, best.poses, scales, config)
     turned = look(pair, by_half_turn(pair, placement_of(best.poses[0]), config.search), scales, config)

@@ -37,7 +37,7 @@ def blueprint(
     left = rrb.Vertical(_maps(extent), _words(), row_shares=[3, 1])
     pictured = [entities for entities in robots if steps.get(entities.robot)]
     pictures = [rrb.Tabs(*(_pictures(item, steps[item.robot]) for item in pictured))] if pictured else []
-    plots = _plot("acceptance", span), _tabs(span)
+    plots = _tabs(("acceptance", "confidence"), span), _tabs(("overlap_m2", "overlap_fraction", STEP_TIME), span)
     right = rrb.Vertical(*pictures, *plots, row_shares=[5] * len(pictures) + [4, 4])
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[11, 9]),
@@ -85,8 +85,8 @@ def _plot(quantity: str, span: Span | None) -> rrb.View:
     )
 
 
-def _tabs(span: Span | None) -> Part:
-    return rrb.Tabs(*(_plot(quantity, span) for quantity in ("overlap_m2", "overlap_fraction", STEP_TIME)))
+def _tabs(quantities: Sequence[str], span: Span | None) -> Part:
+    return rrb.Tabs(*(_plot(quantity, span) for quantity in quantities))
 
 
 def _time_axis(span: Span | None) -> rrb.TimeAxis | None:

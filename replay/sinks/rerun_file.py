@@ -10,6 +10,7 @@ from uuid import NAMESPACE_URL, UUID, uuid5
 import rerun as rr
 
 from mapmerge.config import CellConfig
+from mapmerge.match import CALIBRATED
 from replay.events import Event, Finished, Merged, Noted, Report, RobotPicture, Skipped, Started
 from replay.options import NS_PER_S, OutputOptions
 from replay.sinks import rerun_text as text
@@ -66,7 +67,8 @@ class _Writer:
         self.stream = RrdStream(path, _recording_id(started))
         self._robots = {entities.robot: entities for entities in robots}
         self._maps = MapScene(self.stream, robots, CellConfig(**merge["cells"]))
-        self._plots = Plots(self.stream, robots, merge["verify"]["min_acceptance"])
+        limit_of = "confidence" if merge["method"] in CALIBRATED else "acceptance"
+        self._plots = Plots(self.stream, robots, limit_of, merge["verify"][f"min_{limit_of}"])
         self._steps: dict[str, list[str]] = {}
         self._waiting: list[text.Entry] = []
         self._table = ""

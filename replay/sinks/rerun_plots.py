@@ -12,17 +12,17 @@ from replay.events import Report, Timing
 from replay.sinks.rerun_entities import LIMIT_COLOUR, PLOTS, EntityPath, RobotEntities
 from replay.sinks.rerun_stream import RrdStream
 
-QUANTITIES = ("acceptance", "overlap_m2", "overlap_fraction")
+QUANTITIES = ("acceptance", "confidence", "overlap_m2", "overlap_fraction")
 """Values of each robot in the report that are plotted."""
 STEP_TIME = "step_ms"
 TITLES: Mapping[str, str] = {
     "acceptance": "Acceptance index",
+    "confidence": "Confidence",
     "overlap_m2": "Overlap, m²",
     "overlap_fraction": "Overlap, share",
     STEP_TIME: "Wall time per step, ms",
 }
 
-_LIMIT: EntityPath = [*PLOTS, "acceptance", "limit"]
 _REFERENCE_WIDTH = 4.0
 _WIDTH = 2.0
 _STEPS: tuple[tuple[str, tuple[int, int, int]], ...] = (("merge", (36, 113, 204)), ("render", (240, 120, 10)))
@@ -40,20 +40,21 @@ class Plots:
         The recording.
     robots
         The robots, the reference first.
-    min_acceptance
-        Least acceptance index of a placement.
+    limit_of, limit
+        Which quantity a placement is accepted by, and how much of it is needed.
     """
 
-    def __init__(self, stream: RrdStream, robots: Sequence[RobotEntities], min_acceptance: float) -> None:
+    def __init__(self, stream: RrdStream, robots: Sequence[RobotEntities], limit_of: str, limit: float) -> None:
         self._stream = stream
         self._robots = robots
-        self._min_acceptance = min_acceptance
+        self._limit_path: EntityPath = [*PLOTS, limit_of, "limit"]
+        self._limit = limit
         self._drawn: set[tuple[str, str]] = set()
         for entities in robots:
             for quantity in QUANTITIES:
                 self._style(entities, quantity)
-        limit = rr.SeriesLines(colors=[LIMIT_COLOUR], widths=[1.0], names=["least accepted"])
-        stream.log(_LIMIT, limit, static=True)
+        line = rr.SeriesLines(colors=[LIMIT_COLOUR], widths=[1.0], names=["least accepted"])
+        stream.log(self._limit_path, line, static=True)
         for name, colour in _STEPS:
             style = rr.SeriesLines(colors=[colour], widths=[_WIDTH], names=[name])
             stream.log([*PLOTS, STEP_TIME, name], style, static=True)
@@ -64,7 +65,7 @@ class Plots:
             values = report["robots"][entities.robot]
             for quantity in QUANTITIES:
                 self._show_value(entities, quantity, values)
-        self._stream.log(_LIMIT, rr.Scalars(self._min_acceptance))
+        self._stream.log(self._limit_path, rr.Scalars(self._limit))
         for (name, _), seconds in zip(_STEPS, (timing.merge_s, timing.render_s), strict=True):
             self._stream.log([*PLOTS, STEP_TIME, name], rr.Scalars(seconds * 1000.0))
 
