@@ -168,7 +168,8 @@ class TestWitnesses:
 
     @pytest.fixture
     def strict(self, scripted):
-        scripted.config = MergeConfig(method="scripted", verify=VerifyConfig(min_confidence=0.999))
+        limits = VerifyConfig(min_confidence=0.999, witness_confidence=0.9, nearly_sure_confidence=0.99)
+        scripted.config = MergeConfig(method="scripted", verify=limits)
         scripted.fits(ONE, TWO, APART, confidence=0.9995)
         return scripted
 
@@ -188,6 +189,15 @@ class TestWitnesses:
         assert "30 does not fit 10" in found.reason.message
         assert found.confidence == pytest.approx(1.0 - 0.005 * 0.05)
         assert of_merged_maps(strict.calls()) == []
+
+    def test_may_be_what_it_takes_with_the_limits_by_default(self, strict):
+        limits = VerifyConfig()
+        strict.config = MergeConfig(method="scripted")
+        first, second = limits.nearly_sure_confidence, limits.witness_confidence
+        assert second < first < limits.min_confidence
+        assert self.outcome(strict, first, second).status is Status.MERGED
+        assert self.outcome(strict, first - 1e-6, second).status is Status.UNMERGED
+        assert self.outcome(strict, first, second - 1e-6).status is Status.UNMERGED
 
     @pytest.mark.parametrize("off", [Sim2(1.0), Sim2(0.0, 0.0, 0.1), Sim2(0.5, 0.6)])
     def test_that_disagree_are_not(self, strict, off):
