@@ -164,10 +164,10 @@ def _ranked(pair: PairOfMaps, seen: Look, scales: tuple[float, float], config: M
     """Return the best placement, then its rivals; nothing if there is no placement at all."""
     if len(seen.poses) == 0:
         return seen
-    best = seen.rows(slice(0, 1))
-    near = beside(pair, best.poses, scales, config)
-    turned = look(pair, by_half_turn(pair, placement_of(best.poses[0]), config.search), scales, config)
-    others = seen.rows(slice(1, None)).joined(near).joined(turned)
+    near = beside(pair, seen.poses[:1], scales, config)
+    turned = look(pair, by_half_turn(pair, placement_of(seen.poses[0]), config.search), scales, config)
+    everything = seen.joined(near).joined(turned)
+    best, others = everything.rows(slice(0, 1)), everything.rows(slice(1, None))
     return best.followed_by(rivals(best, others, pair, config.verify))
 
 
