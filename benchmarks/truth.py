@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.json is not None:
         plain = {type(part[0]).__name__: [asdict(row) for row in part] for part in rows if part}
         options.json.write_text(json.dumps(plain, indent=1, default=str) + "\n", encoding="utf-8")
-    reports.show("Held out of any tuning", reports.held_out())
+    reports.show("Held out of the fit", reports.held_out())
     reports.show(f"What must hold of {methods[0]}", criteria.lines(found))
     return 0 if all(item.holds for item in found) else 1
 

@@ -23,7 +23,7 @@ def test_simulated_pairs(tmp_path, capsys):
     status = truth.main(arguments)
     printed = capsys.readouterr().out
     assert "by kind and overlap" in printed
-    assert "Held out of any tuning" in printed
+    assert "Held out of the fit" in printed
     assert status == int("FAILS" in printed)
     results = json.loads(path.read_text(encoding="utf-8"))["Result"]
     assert [item["related"] for item in results] == ["same place", "other building"]
