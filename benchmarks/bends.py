@@ -15,8 +15,8 @@ from samples.mission import known_at
 from samples.pairs import Pair
 from samples.world import Rng
 
-BENT_SHARE = 0.3
-MOST_M = 0.45
+BENT_SHARE = 0.35
+MOST_M = 0.7
 _LENGTH_M = (4.0, 12.0)
 _MOST_POINTS = 4000
 

@@ -21,23 +21,46 @@ from benchmarks.recorded_cuts import cut_pairs, cut_strangers, unrelated
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.match import load_matcher
-from mapmerge.match.cues import Cues
+from mapmerge.match.cues import Fit
 from mapmerge.sim2 import Sim2, wrap_angle
 from samples.kinds import KINDS
-from samples.pairs import Mission, Pair, mission, pairs, strangers
+from samples.pairs import Mission, Pair, Related, mission, pairs, strangers
 
 BLOCK = 4
-PAIRS_A_MISSION = 18
+PAIRS_A_MISSION = 14
 CROSSED_A_BLOCK = 20
+TWINS_A_MISSION = 3
+TWINS: tuple[Related, ...] = ("next floor", "next wing")
 RIGHT_M, RIGHT_RAD = 0.5, math.radians(3.0)
 BENT_RIGHT_M, BENT_RIGHT_RAD = 1.0, math.radians(5.0)
 _LEAST_OVERLAP = 0.08
 _CUTS_A_JOB = 100
+_SEEDS_OF_MISSIONS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One of the placements of a pair that were weighed.
+
+    Parameters
+    ----------
+    error_m, error_rad
+        How far it is off amid the overlap; 0 of strangers.
+    turn_rad
+        By how much it is turned against the first one.
+    fit
+        How well the maps fit there.
+    """
+
+    error_m: float
+    error_rad: float
+    turn_rad: float
+    fit: Fit
 
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """The best placement of one pair, and whether it is right.
+    """The placements of one pair that were weighed, the likeliest first, and which of them is right.
 
     Parameters
     ----------
@@ -55,10 +78,8 @@ class Observation:
         True share of the smaller map that both know.
     bent
         Whether the maps were bent.
-    error_m, error_rad
-        How far the placement is off amid the overlap; 0 of strangers.
-    cues
-        What spoke for and against it.
+    candidates
+        What was weighed; the first one is what the method offered.
     """
 
     name: str
@@ -68,21 +89,24 @@ class Observation:
     ambiguous: bool
     overlap: float
     bent: bool
-    error_m: float
-    error_rad: float
-    cues: Cues
+    candidates: tuple[Candidate, ...]
+
+    def is_right(self, candidate: Candidate) -> bool:
+        """Tell whether a placement is the true one, give or take what a bent map leaves open."""
+        limits = (BENT_RIGHT_M, BENT_RIGHT_RAD) if self.bent else (RIGHT_M, RIGHT_RAD)
+        return self.related and candidate.error_m <= limits[0] and candidate.error_rad <= limits[1]
 
     @property
     def right(self) -> bool:
-        """Whether the placement is the true one, give or take what a bent map leaves open."""
-        limits = (BENT_RIGHT_M, BENT_RIGHT_RAD) if self.bent else (RIGHT_M, RIGHT_RAD)
-        return self.related and self.error_m <= limits[0] and self.error_rad <= limits[1]
+        """Whether the placement that the method offered is right."""
+        return self.is_right(self.candidates[0])
 
     @staticmethod
     def parse(line: str) -> Observation:
         """Read one line of a file of observations."""
         values = json.loads(line)
-        return Observation(**{**values, "cues": Cues(**values["cues"])})
+        candidates = (Candidate(**{**item, "fit": Fit(**item["fit"])}) for item in values["candidates"])
+        return Observation(**{**values, "candidates": tuple(candidates)})
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +156,7 @@ def _simulated(kind: str, first: int) -> Iterator[tuple[Pair, bool]]:
         try:
             found = mission(kind, seed)
             related = list(pairs(found, _LEAST_OVERLAP))
-            twins = [strangers(kind, seed, "next floor"), strangers(kind, seed, "next wing")]
+            twins = [strangers(kind, twin, next_to) for twin in _twin_seeds(seed) for next_to in TWINS]
         except ValueError:  # the robots of this seed meet nothing in common
             continue
         missions.append(found)
@@ -141,6 +165,11 @@ def _simulated(kind: str, first: int) -> Iterator[tuple[Pair, bool]]:
         yield from ((pair, held_out) for pair in twins)
     for one, two in _crossed(missions, rng):
         yield unrelated("crossed", kind, one, two), False
+
+
+def _twin_seeds(seed: int) -> Iterator[int]:
+    """Yield seeds of other buildings, which no mission has."""
+    return (seed + (number + 1) * _SEEDS_OF_MISSIONS for number in range(TWINS_A_MISSION))
 
 
 def _crossed(missions: Sequence[Mission], rng: np.random.Generator) -> Iterator[tuple[Grid, Grid]]:
@@ -169,11 +198,18 @@ def _observation(pair: Pair, group: str, *, held_out: bool, is_bent: bool) -> Ob
     match = matcher.match(target, source, config)
     if match.cues is None or match.target_from_source is None:
         return None
-    off = errors(match.target_from_source, pair.truth, pair.centre_m) if pair.truth else (0.0, 0.0)
-    related = pair.truth is not None
-    return Observation(
-        pair.name, group, held_out, related, pair.ambiguous, pair.overlap, is_bent, off[0], off[1], match.cues
+    weighed = [(match.target_from_source, match.cues.fit)]
+    weighed += [(rival.target_from_source, rival.fit) for rival in match.rivals if rival.fit is not None]
+    candidates = tuple(
+        Candidate(
+            *(errors(pose, pair.truth, pair.centre_m) if pair.truth else (0.0, 0.0)),
+            wrap_angle(pose.yaw_rad - match.target_from_source.yaw_rad),
+            fit,
+        )
+        for pose, fit in weighed
     )
+    related = pair.truth is not None
+    return Observation(pair.name, group, held_out, related, pair.ambiguous, pair.overlap, is_bent, candidates)
 
 
 def errors(found: Sim2, truth: Sim2, at_m: tuple[float, float]) -> tuple[float, float]:

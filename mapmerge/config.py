@@ -24,6 +24,9 @@ __all__ = [
 
 ScaleChoice = Literal["metadata", "free"]
 
+HIGHEST_CONFIDENCE = 0.9999
+"""No placement is called surer: what is seldomer than 1 in 10 000 was not measured."""
+
 
 @dataclass(frozen=True, slots=True)
 class CellConfig(Settings):
@@ -78,7 +81,7 @@ class SearchConfig(Settings):
         Most cells a side of the correlated maps.
     max_candidates
         Candidates of all rotations that are aligned, for each weight.
-    sweep_step_rad, sweep_cell_m, sweep_free_weights, sweep_shifts
+    sweep_step_rad, sweep_cell_m, sweep_free_weights, sweep_shifts, sweep_candidates
         The same for the second look, at all rotations.
     scale_step, distinct_scale
         Ratio of two scales that are tried, where the scale is free, and how far the logarithms of two are apart that
@@ -86,6 +89,9 @@ class SearchConfig(Settings):
     clear_agreement, clear_wall_m, clear_likeness
         A placement is clear, and no second look is taken, with at least this wall agreement and so much matched wall,
         and no rival that is more than so many times as good.
+    weighed, worth_weighing
+        How many distinct placements at most are weighed against each other, and what share of the largest score each
+        of them must have.
     working_cell_m
         Two maps are matched at the coarser of their resolutions, and never finer than this.
     """
@@ -99,15 +105,18 @@ class SearchConfig(Settings):
     peak_distance_m: float = 0.8
     max_side_cells: int = 1500
     max_candidates: int = 40
-    sweep_step_rad: float = math.radians(3.0)
-    sweep_cell_m: float = 0.30
-    sweep_free_weights: tuple[float, ...] = (1.0,)
-    sweep_shifts: int = 4
+    sweep_step_rad: float = math.radians(2.5)
+    sweep_cell_m: float = 0.25
+    sweep_free_weights: tuple[float, ...] = (1.5,)
+    sweep_shifts: int = 6
+    sweep_candidates: int = 240
     scale_step: float = 1.05
     distinct_scale: float = 0.15
     clear_agreement: float = 0.9
     clear_wall_m: float = 10.0
     clear_likeness: float = 0.5
+    weighed: int = 6
+    worth_weighing: float = 0.2
     working_cell_m: float = 0.05
 
     def __post_init__(self) -> None:
@@ -198,9 +207,9 @@ class VerifyConfig(Settings):
         Least acceptance index ω; of the methods that state no confidence.
     least_agreement
         Least share of the walls in the overlap that must agree, however sure a placement is otherwise.
-    poor_agreement, rival_likeness
+    poor_agreement, rival_likelihood
         What is named as the reason where the confidence is too low: walls that disagree, if less than this share
-        of them agrees; else ambiguity, if a rival is more than so many times as good.
+        of them agrees; else ambiguity, if a rival is more than so many times as likely.
     clearly_worse
         A placement within a prior is refused if its score is less than this share of what the maps reach elsewhere.
     min_confidence
@@ -224,19 +233,22 @@ class VerifyConfig(Settings):
     min_acceptance: float = 0.95
     least_agreement: float = 0.7
     poor_agreement: float = 0.8
-    rival_likeness: float = 0.5
+    rival_likelihood: float = 0.05
     clearly_worse: float = 0.85
-    min_confidence: float = 0.98
+    min_confidence: float = 0.95
     witness_confidence: float = 0.8
-    nearly_sure_confidence: float = 0.97
+    nearly_sure_confidence: float = 0.9
     hopeful_confidence: float = 0.05
     distinct_m: float = 0.75
     distinct_rad: float = math.radians(5.0)
 
     def __post_init__(self) -> None:
         super(VerifyConfig, self).__post_init__()
-        if self.min_confidence > 1.0:
-            raise ConfigError(f"min_confidence is {self.min_confidence}; expected a probability, at most 1")
+        if self.min_confidence > HIGHEST_CONFIDENCE:
+            raise ConfigError(
+                f"min_confidence is {self.min_confidence}; expected a probability, at most {HIGHEST_CONFIDENCE}, "
+                "for no placement is called surer than that"
+            )
 
 
 @dataclass(frozen=True, slots=True)

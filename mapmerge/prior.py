@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mapmerge.sim2 import Sim2, wrap_angle
 
 WITHIN_SIGMAS = 3.0
@@ -35,12 +38,27 @@ class Prior:
 
     def allows(self, target_from_source: Sim2) -> bool:
         """Tell whether a placement lies within the prior, in all three of its directions."""
+        pose = target_from_source.x_m, target_from_source.y_m, target_from_source.yaw_rad
+        return bool(self.allows_each(np.array([pose]))[0])
+
+    def allows_each(
+        self, poses: NDArray[np.float64], slack_m: float = 0.0, slack_rad: float = 0.0
+    ) -> NDArray[np.bool_]:
+        """Tell which placements lie within the prior, or so near to it.
+
+        Parameters
+        ----------
+        poses
+            ``target_from_source``: x_m, y_m and yaw_rad, shape (C, 3).
+        slack_m, slack_rad
+            How far beyond it they may lie.
+        """
         believed = self.target_from_source
-        return (
-            abs(target_from_source.x_m - believed.x_m) <= WITHIN_SIGMAS * self.sigma_x_m
-            and abs(target_from_source.y_m - believed.y_m) <= WITHIN_SIGMAS * self.sigma_y_m
-            and abs(wrap_angle(target_from_source.yaw_rad - believed.yaw_rad)) <= WITHIN_SIGMAS * self.sigma_yaw_rad
-        )
+        off = np.abs(poses - (believed.x_m, believed.y_m, believed.yaw_rad))
+        off[:, 2] = np.abs(np.remainder(off[:, 2] + np.pi, 2 * np.pi) - np.pi)
+        limits = WITHIN_SIGMAS * np.array([self.sigma_x_m, self.sigma_y_m, self.sigma_yaw_rad])
+        slack = np.array([slack_m, slack_m, slack_rad])
+        return np.asarray((off <= limits + slack).all(axis=1), np.bool_)
 
     def is_about(self, other: Prior) -> bool:
         """Tell whether another belief is this one but for jitter: no part differs by a hundredth of its spread."""

@@ -78,6 +78,13 @@ class Agreement:
         return matched_m - config.violation_weight * violated_m + config.free_weight * self.free_m2
 
 
+def far_share(ahead: Tally, back: Tally) -> float:
+    """Return the share of the walls of both directions, at the first placement, that are far from the other's walls."""
+    far_m = float(ahead.far_m[0] + back.far_m[0])
+    judged_m = sum(float(tally.matched_m[0] + tally.violated_m[0]) for tally in (ahead, back))
+    return far_m / judged_m if judged_m > 0 else 0.0
+
+
 def probe(prepared: PreparedMap, most_walls: int, most_free: int) -> Probe:
     """Return at most so many points of a map, evenly spread."""
     walls_m, free_m = evenly(prepared.walls_m, most_walls), evenly(prepared.free_m, most_free)
@@ -103,15 +110,15 @@ def agreement(target: PreparedMap, source: PreparedMap, poses: Poses, ahead: Pro
     """
     inverse = inverses(poses)
     return Agreement(
-        _tally(_met(target, poses, ahead.walls_m), ahead.wall_m * poses[:, 3]),
-        _tally(_met(source, inverse, back.walls_m), back.wall_m),
+        tally(_met(target, poses, ahead.walls_m), ahead.wall_m * poses[:, 3]),
+        tally(_met(source, inverse, back.walls_m), back.wall_m),
         np.count_nonzero(_met(target, poses, ahead.free_m) & MEETS_FREE, axis=1) * ahead.free_m2 * poses[:, 3] ** 2,
     )
 
 
-def tally_at(prepared: PreparedMap, x_m: NDArray[np.float32], y_m: NDArray[np.float32], wall_m: float) -> Tally:
-    """Return what walls at places in the map's grid frame, shape (N,), meet there, each for so much wall."""
-    return _tally(_looked_up(prepared, x_m[None], y_m[None]), wall_m)
+def met_at(prepared: PreparedMap, x_m: NDArray[np.float32], y_m: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Return `PreparedMap.meets` at places in the map's grid frame, shape (N,), as one row, shape (1, N)."""
+    return _looked_up(prepared, x_m[None], y_m[None])
 
 
 def _met(prepared: PreparedMap, poses: Poses, points_m: Points) -> NDArray[np.uint8]:
@@ -128,7 +135,9 @@ def _looked_up(prepared: PreparedMap, x: NDArray[np.float32], y: NDArray[np.floa
     return found
 
 
-def _tally(met: NDArray[np.uint8], wall_m: float | Lengths) -> Tally:
+def tally(met: NDArray[np.uint8], wall_m: float | Lengths) -> Tally:
+    """Return what walls met, of `PreparedMap.meets` at each, shape (C, N), each for so much wall."""
+
     def length_m(mask: int, value: int) -> Lengths:
         return np.asarray(np.count_nonzero((met & mask) == value, axis=1) * wall_m, np.float64)
 

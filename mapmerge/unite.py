@@ -13,12 +13,11 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
-from mapmerge.config import MergeConfig, VerifyConfig
+from mapmerge.config import HIGHEST_CONFIDENCE, MergeConfig, VerifyConfig
 from mapmerge.fuse import Layer, fuse
 from mapmerge.graph import Forest
 from mapmerge.grid import Grid
 from mapmerge.match import Match, Matcher
-from mapmerge.match.confidence import HIGHEST
 from mapmerge.outcome import Pair
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
@@ -134,7 +133,10 @@ def agreed(
     witnesses = 1 + len(agreeing)
     message = f"{witnesses} pairs of maps agree where {best[1]} lies on {best[0]}; by itself, {match.reason.message}"
     return best, replace(
-        match, accepted=True, confidence=min(1.0 - doubt, HIGHEST), reason=Reason(ReasonCode.ACCEPTED, message)
+        match,
+        accepted=True,
+        confidence=min(1.0 - doubt, HIGHEST_CONFIDENCE),
+        reason=Reason(ReasonCode.ACCEPTED, message),
     )
 
 

@@ -56,12 +56,19 @@ def rank_score_m(target: PreparedMap, source: PreparedMap, target_from_source: S
 
 def verify(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, config: VerifyConfig) -> Scores:
     """Return all that is known of a placement between the grid frames."""
+    return verified(target, source, target_from_source, config)[0]
+
+
+def verified(
+    target: PreparedMap, source: PreparedMap, target_from_source: Sim2, config: VerifyConfig
+) -> tuple[Scores, Agreement]:
+    """Return all that is known of a placement between the grid frames, and what it was computed from."""
     found = _agreement(target, source, target_from_source)
     agree, disagree, both = cell_agreement(target, source, target_from_source)
     cell_m2 = (source.resolution_m * target_from_source.scale) ** 2
     smaller_m2 = min(target.grid.known_area_m2, source.grid.known_area_m2 * target_from_source.scale**2)
     ahead, back = found.ahead, found.back
-    return Scores(
+    scores = Scores(
         score_m=float(found.score_m(config)[0]),
         acceptance=agree / (agree + disagree) if agree else 0.0,
         overlap_m2=both * cell_m2,
@@ -70,6 +77,7 @@ def verify(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, c
         matched_wall_m=float(ahead.matched_m[0] + back.matched_m[0]) / 2,
         violated_wall_m=float(ahead.violated_m[0] + back.violated_m[0]) / 2,
     )
+    return scores, found
 
 
 def _agreement(target: PreparedMap, source: PreparedMap, target_from_source: Sim2) -> Agreement:

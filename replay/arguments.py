@@ -143,10 +143,9 @@ def _placing_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--min-confidence",
         metavar="P",
-        default="0.98",
-        help="least probability that a placement is right (default: %(default)s, of 4502 accepted placements "
-        "that were observed none was wrong, see docs/benchmarks.md); the methods existing and paper "
-        "state none and ignore it",
+        default="0.95",
+        help="least probability that a placement is right (default: %(default)s; how many are wrong at each: "
+        "docs/benchmarks.md); the methods existing and paper state none and ignore it",
     )
     group.add_argument(
         "--init-pose",
@@ -234,12 +233,16 @@ def _placing_options(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _probability(text: str) -> float:
+    from mapmerge.config import HIGHEST_CONFIDENCE
+
     try:
         probability = float(text)
     except ValueError:
         probability = math.nan
     if not 0.0 < probability < 1.0:
         raise UsageError(f"--min-confidence {text}: expected a probability between 0 and 1, such as 0.99")
+    if probability > HIGHEST_CONFIDENCE:
+        raise UsageError(f"--min-confidence {text}: no placement is called surer than {HIGHEST_CONFIDENCE}")
     return probability
 
 

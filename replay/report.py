@@ -162,7 +162,12 @@ def _pair(pair: Pair, match: Match, prior: Prior | None) -> Json:
         "reason": _reason(match.reason),
         "prior": _prior(prior),
         "rivals": [
-            {"a_from_b": _pose(rival.target_from_source), "score_m": _round(rival.score_m)} for rival in match.rivals
+            {
+                "a_from_b": _pose(rival.target_from_source),
+                "score_m": _round(rival.score_m),
+                "likelihood": None if rival.likelihood is None else _round(rival.likelihood),
+            }
+            for rival in match.rivals
         ],
     }
 

@@ -90,11 +90,11 @@ def explored(site: Site, number: int, strip: Strip, mess: Mess, resolution_m: fl
     robot = robot_of(mess, resolution_m, rng)
     run = explore(visit.world, follow(_way(visit, strip, rng), _any_heading(rng), robot.pace), robot, maps, rng)
     published_from_map = _drawn_frame(rng)
-    published = (
-        MapOf(snapshot.time_s, _published(snapshot.grid, published_from_map, is_trinary=mess.is_trinary))
+    shown = (
+        MapOf(snapshot.time_s, published(snapshot.grid, published_from_map, is_trinary=mess.is_trinary))
         for snapshot in run.snapshots
     )
-    return Explored(run, tuple(published), published_from_map, mess)
+    return Explored(run, tuple(shown), published_from_map, mess)
 
 
 def _way(visit: Visit, strip: Strip, rng: Rng) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
@@ -116,7 +116,8 @@ def _drawn_frame(rng: Rng) -> Sim2:
     return Sim2(x_m, y_m, yaw_rad) if rng.uniform() < 0.5 else IDENTITY
 
 
-def _published(grid: Grid, published_from_map: Sim2, *, is_trinary: bool) -> Grid:
+def published(grid: Grid, published_from_map: Sim2 = IDENTITY, *, is_trinary: bool) -> Grid:
+    """Return a map as a robot publishes it: in another frame, and with free, occupied and unknown cells alone."""
     cells = grid.cells
     if is_trinary:
         unsure = np.where(cells >= _MIN_OCCUPIED, 100, -1)

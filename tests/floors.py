@@ -260,11 +260,16 @@ def pair_of_maps(target: Grid, source: Grid, prior: Prior | None = None) -> Pair
 
 
 def walled_room(
-    size_m: tuple[float, float], *, open_ends: bool, ragged: int | None = None, yaw_rad: float = 0.0
+    size_m: tuple[float, float],
+    *,
+    open_ends: bool,
+    ragged: int | None = None,
+    yaw_rad: float = 0.0,
+    inside: Sequence[Box] = (),
 ) -> Grid:
     """Return a room; without its short walls if its ends are open. Its map frame is the room's, whatever the turn."""
     width_m, height_m = size_m
-    walls = outline(0.0, 0.0, *size_m)
+    walls = [*outline(0.0, 0.0, *size_m), *inside]
     side_m = math.hypot(*size_m) + 2.0
     corner = Sim2(width_m / 2, height_m / 2, yaw_rad) @ Sim2(-side_m / 2, -side_m / 2)
     known = (

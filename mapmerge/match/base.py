@@ -8,7 +8,7 @@ from typing import Protocol, TypeVar
 from mapmerge.config import MergeConfig
 from mapmerge.evidence import Evidence
 from mapmerge.grid import Grid
-from mapmerge.match.cues import Cues
+from mapmerge.match.cues import Cues, Fit
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason
 from mapmerge.sim2 import Sim2
@@ -27,10 +27,16 @@ class Rival:
         Where it would put the source's map frame in the target's.
     score_m
         Its score, to be compared with `Scores.score_m` of the match.
+    likelihood
+        How many times as likely as the best placement it is by itself; None where the method states no confidence.
+    fit
+        The figures that its likelihood was computed from.
     """
 
     target_from_source: Sim2
     score_m: float
+    likelihood: float | None = None
+    fit: Fit | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

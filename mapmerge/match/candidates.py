@@ -55,7 +55,7 @@ def by_sweep(pair: PairOfMaps, config: SearchConfig) -> Poses:
     Slower, but finds the rotation of maps without straight walls, and of small maps of which the spectra tell little.
     """
     turns = [Sim2(yaw_rad=yaw) for yaw in np.arange(0.0, math.pi, config.sweep_step_rad).tolist()]
-    most = 2 * config.max_candidates
+    most = config.sweep_candidates
     return _correlated(pair, turns, config.sweep_cell_m, config.sweep_free_weights, config.sweep_shifts, most, config)
 
 

@@ -1,25 +1,29 @@
 """The probability that a placement is right, from what speaks for and against it.
 
-An additive logistic model: each cue contributes a piecewise linear curve that only rises, or only falls, as the cue
-says more for the placement, and that is flat beyond what was seen in fitting. `mapmerge.match.calibration` holds what
-``python -m benchmarks.calibrate`` fitted; docs/method.md says on what, and how well it holds on other buildings.
+Two additive models, each a sum of piecewise linear curves that only rise, or only fall, as a cue says more for the
+placement, and that are flat beyond what was seen in fitting. The first one, `odds`, weighs placements by themselves:
+at most one of them is right, so that each takes its share of the likelihood (a conditional logit, with "nothing in
+common" as one more choice). The second one, `confidence`, is of how the likeliest one stands among the others.
+`mapmerge.match.calibration` holds what ``python -m benchmarks.calibrate`` fitted; docs/method.md says on what, and how
+well it holds on other buildings.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from mapmerge.match.calibration import CURVES, INTERCEPT
-from mapmerge.match.cues import Cues
+from mapmerge.config import HIGHEST_CONFIDENCE
+from mapmerge.match.calibration import CONFIDENCE, ODDS
+from mapmerge.match.cues import Contest, Fit, clearance
 
-_ALIKE, _AS_GOOD = 0.85, 0.98
+UNRIVALLED = 20.0
+"""`Contest.lead_odds` where there is nothing else."""
+
 _MOST_LOG_ODDS = 50.0
-_FITS_WORSE, _FITS_AS_WELL = -0.03, -0.02
-
-HIGHEST = 0.9999
-"""No placement is called surer: what is seldomer than 1 in 10 000 was not measured."""
+_LEAD_COUNTS = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,39 +45,91 @@ class Curve:
         """Return the contribution of a value."""
         total = 0.0
         for (low, high), rise in zip(pairwise(self.knots), self.rises, strict=True):
-            total += rise * _ramp(value, low, high)
+            total += rise * min(1.0, max(0.0, (value - low) / (high - low)))
         return total
 
 
-_CURVES = {cue: Curve(knots, rises) for cue, (knots, rises) in CURVES.items()}
-
-
-def confidence(cues: Cues, tries: float = 1.0) -> float:
-    """Return the calibrated probability that a placement with these cues is right.
+@dataclass(frozen=True, slots=True)
+class Additive:
+    """A sum of curves.
 
     Parameters
     ----------
-    cues
-        What speaks for and against it.
+    intercept
+        Log odds where all cues are at or below their first knot.
+    curves
+        By the name of their cue.
+    """
+
+    intercept: float
+    curves: Mapping[str, Curve]
+
+    def log_odds(self, cues: Fit | Contest) -> float:
+        """Return the sum for cues."""
+        return self.intercept + sum(curve.at(getattr(cues, name)) for name, curve in self.curves.items())
+
+
+def additive(table: tuple[float, Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]]]) -> Additive:
+    """Return a model of `mapmerge.match.calibration`."""
+    intercept, curves = table
+    return Additive(intercept, {cue: Curve(*curve) for cue, curve in curves.items()})
+
+
+_ODDS, _CONFIDENCE = additive(ODDS), additive(CONFIDENCE)
+
+
+def odds(fit: Fit) -> float:
+    """Return the log odds that a placement is right, by itself, against that the maps have nothing in common."""
+    return _ODDS.log_odds(fit)
+
+
+def contest(fits: Sequence[Fit], log_odds: Sequence[float]) -> Contest:
+    """Return how the first of some distinct placements stands among them.
+
+    Parameters
+    ----------
+    fits
+        Of each, at least one.
+    log_odds
+        `odds` of each.
+    """
+    best, others = log_odds[0], log_odds[1:]
+    most = max(0.0, *log_odds)
+    total = math.exp(-most) + sum(math.exp(value - most) for value in log_odds)
+    rival_m = max((fit.score_m for fit in fits[1:]), default=0.0)
+    score_m = fits[0].score_m
+    lead_m = max(0.0, score_m - max(0.0, rival_m))
+    return Contest(
+        odds=best,
+        lead_odds=min(UNRIVALLED, best - max(others)) if others else UNRIVALLED,
+        share=math.exp(best - most) / total,
+        likeness=min(1.0, max(0.0, rival_m) / score_m) if score_m > 0.0 else 1.0,
+        lead_m=lead_m,
+        clearance=clearance(lead_m, fits[0].contradicted_m),
+    )
+
+
+def confidence(standing: Contest, tries: float = 1.0) -> float:
+    """Return the calibrated probability that the likeliest placement, which stands like this among others, is right.
+
+    Of two placements that are as likely only one is right, whatever else is said of them.
+
+    Parameters
+    ----------
+    standing
+        Among all that were weighed.
     tries
         It is the best of so many independent searches, each of which might have found a wrong one.
     """
-    log_odds = INTERCEPT + sum(curve.at(getattr(cues, cue)) for cue, curve in _CURVES.items())
-    share = 1.0 / (1.0 + math.exp(-min(max(log_odds, -_MOST_LOG_ODDS), _MOST_LOG_ODDS)))
-    return max(0.0, min(HIGHEST, 1.0 - tries * (1.0 - share))) / contenders(cues)
+    stated = stated_confidence(_CONFIDENCE.log_odds(standing), standing.lead_odds)
+    return max(0.0, 1.0 - tries * (1.0 - stated))
 
 
-def contenders(cues: Cues) -> float:
-    """Return among how many placements the choice is, from 1 to 2, which no sum of cues may outweigh.
-
-    Of two placements that are as good only one is right. Nor can the better one be told where walls agree as well at
-    the other over a good part of the length: so look the halves of a symmetric building, of which the one that lets the
-    maps overlap more is not the likelier one.
-    """
-    as_good = _ramp(cues.likeness, _ALIKE, _AS_GOOD)
-    fits_as_well = _ramp(cues.rival_agreement - cues.wall_agreement, _FITS_WORSE, _FITS_AS_WELL)
-    return 1.0 + max(as_good, fits_as_well)
+def stated_confidence(log_odds: float, lead_odds: float) -> float:
+    """Return the probability of log odds, capped where another placement is about as likely."""
+    return min(HIGHEST_CONFIDENCE, logistic(log_odds), logistic(_LEAD_COUNTS * lead_odds))
 
 
-def _ramp(value: float, low: float, high: float) -> float:
-    return min(1.0, max(0.0, (value - low) / (high - low)))
+def logistic(log_odds: float) -> float:
+    """Return the probability of log odds."""
+    return 1.0 / (1.0 + math.exp(-min(max(log_odds, -_MOST_LOG_ODDS), _MOST_LOG_ODDS)))

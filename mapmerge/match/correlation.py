@@ -5,8 +5,9 @@
 3. Every candidate aligned by ICP against the nearest walls of the target, and ranked by walls and free space that
    agree, in both directions; the best ones once more.
 4. Unless the best one is clear, a second look, at all rotations.
-5. The best one aligned to a fraction of a cell, and its confidence computed from what speaks for and against it, the
-   best placement that is distinct from it among that.
+5. The best of them that are distinct weighed against each other: the likeliest one is taken.
+6. That one aligned to a fraction of a cell, and its confidence computed from what speaks for and against it, and from
+   how it stands among the others.
 
 The smaller map is always the one that is moved, so that swapping the maps gives the inverse.
 """
@@ -14,40 +15,30 @@ The smaller map is always the one that is moved, so that swapping the maps gives
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from mapmerge.align import placement_of, poses_of
+from mapmerge.align import Poses, placement_of, poses_of
 from mapmerge.config import MergeConfig
 from mapmerge.evidence import Curve, CurvesEvidence, Evidence, OverlayEvidence, SurfaceEvidence
 from mapmerge.grid import Grid
 from mapmerge.match.base import Match, Rival
 from mapmerge.match.candidates import all_scales, by_half_turn, by_prior, by_spectra, by_sweep, likely_rotations
 from mapmerge.match.confidence import confidence
-from mapmerge.match.cues import cues_of
+from mapmerge.match.cues import Cues
 from mapmerge.match.look import Look, beside, look, rivals
 from mapmerge.match.pair import DescribedMap, PairOfMaps
 from mapmerge.match.spectrum import orientation_spectra, spectrum_correlation
 from mapmerge.match.surface import TranslationSearch
 from mapmerge.match.verdict import contradicted, judge, too_little_structure, within
+from mapmerge.match.weigh import Weighed, weighed
 from mapmerge.polish import polish
 from mapmerge.prepare import prepare
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
-from mapmerge.verify import Scores, verify
-
-_RIVALS_REPORTED = 3
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Found:
-    """The best placement between the grid frames, its figures, and what competes with it."""
-
-    best: Sim2
-    scores: Scores
-    rivals: Look
+from mapmerge.verify import verify
 
 
 class CorrelationMatcher:
@@ -92,40 +83,38 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
     """Return where the source of the pair lies on its target."""
     rotations = likely_rotations(pair, config.search)
     ranked = _search(pair, rotations, config)
-    match = _judged(pair, ranked, rotations, config)
-    if match.reason.code is ReasonCode.TOO_LITTLE_OVERLAP:
-        # of what two maps both know, most is free space, but not all
-        least_free_m2 = config.verify.min_overlap_m2 / 2
-        telling = ranked.substantial_first(config.verify.min_matched_wall_m, least_free_m2)
-        return match if telling is ranked else _judged(pair, telling, rotations, config)
-    return match
-
-
-def _judged(pair: PairOfMaps, ranked: Look, rotations: tuple[float, ...], config: MergeConfig) -> Match:
-    """Return what is said of the first of the ranked placements."""
-    found = _polished(pair, ranked, config)
-    if found is None:
+    if len(ranked.poses) == 0:
         reason = Reason(ReasonCode.NO_CANDIDATE, "no placement lets walls of the two maps coincide")
         return Match(None, None, accepted=False, reason=reason, evidence=(_spectra(pair, rotations),))
-    cues = cues_of(pair, found.best, found.scores, found.rivals, config)
-    sure = confidence(cues, _tries(config))
-    reason = judge(found.scores, cues, sure, config.verify)
+    found = _weighed(pair, ranked, config)
+    best = _polished(pair, placement_of(found.look.poses[0]), config)
+    scores = verify(pair.target.map, pair.source.map, best, config.verify)
+    cues = Cues(found.fits[0], found.contest)
+    sure = confidence(cues.contest, _tries(config))
+    reason = judge(scores, cues, sure, config.verify)
     return Match(
-        target_from_source=pair.between_maps(found.best),
-        scores=found.scores,
+        target_from_source=pair.between_maps(best),
+        scores=scores,
         accepted=reason.code is ReasonCode.ACCEPTED,
         reason=reason,
         confidence=sure,
         cues=cues,
-        rivals=tuple(
-            Rival(pair.between_maps(placement_of(pose)), float(score_m))
-            for pose, score_m in zip(found.rivals.poses, found.rivals.scores_m, strict=True)
-        )[:_RIVALS_REPORTED],
+        rivals=_rivals(pair, found),
         evidence=(
             _spectra(pair, rotations),
-            _surface(pair, found, config),
-            _overlay(pair, found.best, config),
+            _surface(pair, best, ranked, config),
+            _overlay(pair, best, config),
         ),
+    )
+
+
+def _rivals(pair: PairOfMaps, found: Weighed) -> tuple[Rival, ...]:
+    """Return the placements that compete with the first one."""
+    best, *others = found.log_odds
+    rows = zip(found.look.poses[1:], found.look.scores_m[1:].tolist(), others, found.fits[1:], strict=True)
+    return tuple(
+        Rival(pair.between_maps(placement_of(pose)), score_m, math.exp(min(0.0, log_odds - best)), fit)
+        for pose, score_m, log_odds, fit in rows
     )
 
 
@@ -164,22 +153,35 @@ def _ranked(pair: PairOfMaps, seen: Look, scales: tuple[float, float], config: M
     """Return the best placement, then its rivals; nothing if there is no placement at all."""
     if len(seen.poses) == 0:
         return seen
-    near = beside(pair, seen.poses[:1], scales, config)
-    turned = look(pair, by_half_turn(pair, placement_of(seen.poses[0]), config.search), scales, config)
-    everything = seen.joined(near).joined(turned)
-    best, others = everything.rows(slice(0, 1)), everything.rows(slice(1, None))
+    return _apart(pair, seen.joined(_around(pair, seen.poses[:1], scales, config)), config)
+
+
+def _around(pair: PairOfMaps, pose: Poses, scales: tuple[float, float], config: MergeConfig) -> Look:
+    """Return what competes with a placement, shape (1, 4), and is easily overlooked: beside it, and turned by 180°."""
+    near = beside(pair, pose, scales, config)
+    return near.joined(look(pair, by_half_turn(pair, placement_of(pose[0]), config.search), scales, config))
+
+
+def _apart(pair: PairOfMaps, seen: Look, config: MergeConfig) -> Look:
+    """Return the best placement and those that differ from it and from all better ones."""
+    best, others = seen.rows(slice(0, 1)), seen.rows(slice(1, None))
     return best.followed_by(rivals(best, others, pair, config.verify))
 
 
-def _polished(pair: PairOfMaps, ranked: Look, config: MergeConfig) -> _Found | None:
-    """Return the best placement, aligned to a fraction of a cell, with its figures and its rivals."""
-    if len(ranked.poses) == 0:
-        return None
-    target, source = pair.target.map, pair.source.map
-    best = polish(target, source.wall_cells_m, placement_of(ranked.poses[0]), config.refine)
-    if not pair.allowed(poses_of([best])).all():
-        best = placement_of(ranked.poses[0])
-    return _Found(best, verify(target, source, best, config.verify), ranked.rows(slice(1, None)))
+def _weighed(pair: PairOfMaps, ranked: Look, config: MergeConfig) -> Weighed:
+    """Return the ranked placements, likeliest first, with what competes with that one."""
+    found = weighed(pair, ranked, config)
+    likeliest = found.look.poses[:1]
+    if np.array_equal(likeliest, ranked.poses[:1]):
+        return found
+    around = _around(pair, likeliest, _scales(pair, config)[0], config)
+    return weighed(pair, _apart(pair, ranked.joined(around), config), config)
+
+
+def _polished(pair: PairOfMaps, rough: Sim2, config: MergeConfig) -> Sim2:
+    """Return a placement aligned to a fraction of a cell, unless that leads out of what is allowed."""
+    best = polish(pair.target.map, pair.source.map.wall_cells_m, rough, config.refine)
+    return best if pair.allowed(poses_of([best])).all() else rough
 
 
 def _is_clear(ranked: Look, config: MergeConfig) -> bool:
@@ -200,7 +202,7 @@ def _inverted(match: Match) -> Match:
     return replace(
         match,
         target_from_source=pose.inverse() if pose else None,
-        rivals=tuple(Rival(rival.target_from_source.inverse(), rival.score_m) for rival in match.rivals),
+        rivals=tuple(replace(rival, target_from_source=rival.target_from_source.inverse()) for rival in match.rivals),
         evidence=tuple(_swapped_evidence(item) for item in match.evidence),
     )
 
@@ -234,10 +236,10 @@ def _spectra(pair: PairOfMaps, rotations: tuple[float, ...]) -> CurvesEvidence:
     )
 
 
-def _surface(pair: PairOfMaps, found: _Found, config: MergeConfig) -> Evidence:
+def _surface(pair: PairOfMaps, best: Sim2, ranked: Look, config: MergeConfig) -> Evidence:
     """Return the surface at the rotation of the best placement, with all placements of about this rotation."""
     search = config.search
-    turn = Sim2(0.0, 0.0, found.best.yaw_rad, found.best.scale)
+    turn = Sim2(0.0, 0.0, best.yaw_rad, best.scale)
     translations = TranslationSearch(
         pair.target.map,
         pair.source.map,
@@ -247,13 +249,14 @@ def _surface(pair: PairOfMaps, found: _Found, config: MergeConfig) -> Evidence:
         max(1.0, turn.scale),
     )
     surface = translations.surfaces(turn)[0]
-    same_turn = np.abs(np.remainder(found.rivals.poses[:, 2] - turn.yaw_rad + np.pi, 2 * np.pi) - np.pi) < 0.1
+    others = ranked.poses
+    same_turn = np.abs(np.remainder(others[:, 2] - turn.yaw_rad + np.pi, 2 * np.pi) - np.pi) < 0.1
     return SurfaceEvidence(
         step="correlation_surface",
         title=f"Correlation of walls and free space, one map turned by {math.degrees(turn.yaw_rad):.1f}°",
         values=surface.values,
-        marks=tuple(surface.index(placement_of(pose)) for pose in found.rivals.poses[same_turn]),
-        chosen=surface.index(found.best),
+        marks=tuple(surface.index(placement_of(pose)) for pose in others[same_turn]),
+        chosen=surface.index(best),
     )
 
 

@@ -51,17 +51,6 @@ class Look:
         parts = (self.poses, self.scores_m, self.matched_m, self.shares, self.free_m2)
         return Look(*(part[chosen] for part in parts))
 
-    def substantial_first(self, least_wall_m: float, least_free_m2: float) -> Look:
-        """Return the placements with the best of those first that have so much wall and free space in common, if any.
-
-        A placement with hardly any overlap has hardly anything against it; it says nothing of why maps do not fit.
-        """
-        found = np.flatnonzero((self.matched_m >= least_wall_m) & (self.free_m2 >= least_free_m2))
-        if len(found) == 0:
-            return self
-        order = [int(found[0]), *(row for row in range(len(self.poses)) if row != found[0])]
-        return self.rows(order)
-
     def followed_by(self, other: Look) -> Look:
         """Return the placements of this look, then those of the other."""
         return Look(

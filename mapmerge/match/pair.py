@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mapmerge.align import Poses, composed, inverses, poses_of
 from mapmerge.match.spectrum import Spectra
 from mapmerge.prepare import PreparedMap
-from mapmerge.prior import WITHIN_SIGMAS, Prior
+from mapmerge.prior import Prior
 from mapmerge.sim2 import Sim2
 
 
@@ -96,7 +96,4 @@ class PairOfMaps:
         moved = composed(composed(poses_of([target]), poses), poses_of([source]))
         if self.swapped:
             moved = inverses(moved)
-        off = np.abs(moved[:, :3] - poses_of([self.prior.target_from_source])[:, :3])
-        off[:, 2] = np.abs(np.remainder(off[:, 2] + np.pi, 2 * np.pi) - np.pi)
-        sigmas = np.array([self.prior.sigma_x_m, self.prior.sigma_y_m, self.prior.sigma_yaw_rad])
-        return np.asarray((off <= WITHIN_SIGMAS * sigmas + (slack_m, slack_m, slack_rad)).all(axis=1), np.bool_)
+        return self.prior.allows_each(moved[:, :3], slack_m, slack_rad)

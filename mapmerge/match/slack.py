@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mapmerge.align import placed, poses_of
 from mapmerge.config import SlackConfig
 from mapmerge.prepare import PreparedMap
-from mapmerge.score import Tally, tally_at
+from mapmerge.score import Tally, far_share, met_at, tally
 from mapmerge.sim2 import Sim2
 
 Floats = NDArray[np.float32]
@@ -30,18 +30,20 @@ class Slack:
     ----------
     ahead, back
         What the walls of the source, and of the target, meet once they are shifted.
-    bend_m
-        Root mean square of the shifts where walls agree.
     """
 
     ahead: Tally
     back: Tally
-    bend_m: float
 
     @property
     def share(self) -> float:
         """Share of the walls that agree, in the worse direction."""
         return float(min(self.ahead.share[0], self.back.share[0]))
+
+    @property
+    def far_share(self) -> float:
+        """Share of the walls that stand amid the other map's free space, far from its walls."""
+        return far_share(self.ahead, self.back)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,15 +72,13 @@ def slack(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, co
     x, y = (values[0] for values in placed(pose, source.walls_m))
     field = _bent(target, x, y, config)
     shift_x, shift_y = field.at(x, y)
-    ahead = tally_at(target, x + shift_x, y + shift_y, source.wall_spacing_m * target_from_source.scale)
+    ahead = tally(met_at(target, x + shift_x, y + shift_y), source.wall_spacing_m * target_from_source.scale)
     wall_x, wall_y = target.walls_m.astype(np.float32).T
     back_x, back_y = field.at(wall_x, wall_y)
     unbent = np.stack([wall_x - back_x, wall_y - back_y], axis=1).astype(np.float64)
     in_source = target_from_source.inverse().apply(unbent).astype(np.float32)
-    back = tally_at(source, in_source[:, 0], in_source[:, 1], target.wall_spacing_m)
-    met = target.nearest.distance_m(target.walls_m, x + shift_x, y + shift_y) <= 2 * source.wall_spacing_m
-    square = np.square(shift_x[met]) + np.square(shift_y[met])
-    return Slack(ahead, back, float(np.sqrt(square.mean())) if met.any() else 0.0)
+    back = tally(met_at(source, in_source[:, 0], in_source[:, 1]), target.wall_spacing_m)
+    return Slack(ahead, back)
 
 
 def _bent(target: PreparedMap, x: Floats, y: Floats, config: SlackConfig) -> _Field:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from mapmerge.config import VerifyConfig
 from mapmerge.match.base import Match, Rival
-from mapmerge.match.confidence import contenders
 from mapmerge.match.cues import Cues
 from mapmerge.match.pair import DescribedMap, PairOfMaps
 from mapmerge.prior import Prior
@@ -40,24 +39,22 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig) -
         floor = f"less than {config.least_agreement:.0%}"
         message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree, {floor}"
         return Reason(ReasonCode.WALLS_DISAGREE, message)
+    rival = math.exp(min(0.0, -cues.contest.lead_odds))
     if confidence >= config.min_confidence:
         message = (
             f"{scores.overlap_m2:.0f} m² overlap, walls agree {scores.wall_agreement:.2f}, "
-            f"next best placement {cues.likeness:.2f} times as good"
+            f"next best placement {_times(rival)} times as likely"
         )
         return Reason(ReasonCode.ACCEPTED, message)
     if scores.score_m <= 0.0 or scores.wall_agreement < config.poor_agreement:
         message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree; {doubt}"
         return Reason(ReasonCode.WALLS_DISAGREE, message)
-    if cues.likeness > config.rival_likeness:
-        message = f"another placement is {cues.likeness:.2f} times as good as the best one; {doubt}"
-        return Reason(ReasonCode.AMBIGUOUS, message)
-    if contenders(cues) > 1.0:
-        message = f"at another placement, with less overlap, walls agree as well ({cues.rival_agreement:.2f}); {doubt}"
+    if rival > config.rival_likelihood:
+        message = f"another placement is {_times(rival)} times as likely as the best one; {doubt}"
         return Reason(ReasonCode.AMBIGUOUS, message)
     message = (
-        f"only {scores.overlap_m2:.0f} m² overlap with {scores.matched_wall_m:.0f} m of wall, of which "
-        f"{_down(scores.wall_agreement, 2):.0%} agrees; {doubt}"
+        f"{scores.overlap_m2:.0f} m² overlap and {scores.matched_wall_m:.0f} m of wall that agrees, "
+        f"{_down(scores.wall_agreement, 2):.0%} of it, are not enough; {doubt}"
     )
     return Reason(ReasonCode.LOW_CONFIDENCE, message)
 
@@ -86,6 +83,11 @@ def contradicted(match: Match, elsewhere: Match, prior: Prior, pair: PairOfMaps,
         reason=Reason(ReasonCode.PRIOR_CONTRADICTED, message),
         rivals=(Rival(elsewhere.target_from_source, elsewhere.scores.score_m), *match.rivals),
     )
+
+
+def _times(likelihood: float) -> str:
+    """Return how many times as likely something is, 0 to 1, with as many digits as tell it from 0."""
+    return "less than 0.001" if likelihood < 0.001 else f"{likelihood:.{2 if likelihood >= 0.1 else 3}f}"
 
 
 def _percent(share: float) -> str:

@@ -13,13 +13,14 @@ from mapmerge.evidence import Evidence, OverlayEvidence
 from mapmerge.match.base import Match, Rival
 from mapmerge.paper.ransac import Bounds, Models
 from mapmerge.prepare import PreparedMap
-from mapmerge.prior import WITHIN_SIGMAS, Prior
+from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Points, Sim2
 from mapmerge.verify import Scores, verify
 
 MIN_FEATURES = 4
 _RIVALS_REPORTED = 3
+_SLACK_RAD = math.radians(3.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,12 +59,9 @@ def allowed(models: Models, target: PreparedMap, source: PreparedMap, prior: Pri
         return models
     outer, inner = target.grid.map_from_grid, source.grid.map_from_grid.inverse()
     shift = models.apply(np.array([[inner.x_m, inner.y_m]]))[:, 0]
-    off_m = np.abs(outer.apply(shift) - (prior.target_from_source.x_m, prior.target_from_source.y_m))
-    limits_m = WITHIN_SIGMAS * np.array([prior.sigma_x_m, prior.sigma_y_m]) + slack_m
-    turn_rad = models.turn_rad + outer.yaw_rad + inner.yaw_rad - prior.target_from_source.yaw_rad
-    off_rad = np.abs(turn_rad - math.tau * np.rint(turn_rad / math.tau))
-    limit_rad = WITHIN_SIGMAS * prior.sigma_yaw_rad + math.radians(3.0)
-    return models[(off_m <= limits_m).all(axis=1) & (off_rad <= limit_rad)]
+    turn_rad = models.turn_rad + outer.yaw_rad + inner.yaw_rad
+    poses = np.column_stack([outer.apply(shift), turn_rad])
+    return models[prior.allows_each(poses, slack_m, _SLACK_RAD)]
 
 
 def candidates(

@@ -140,7 +140,7 @@ def open_console(*, stderr: bool = False) -> Console:
 
 
 def print_table(console: Console, report: Report) -> None:
-    """Print a row for each robot: status, pose, acceptance index, overlap, confidence where it is known, reason."""
+    """Print a row for each robot: status, pose (its scale if that is free), agreement, confidence if known, reason."""
     from rich.table import Table
     from rich.text import Text
 
@@ -148,7 +148,9 @@ def print_table(console: Console, report: Report) -> None:
     for name in ("robot", "status"):
         table.add_column(name, no_wrap=True)
     known = any(row["confidence"] is not None for row in report["robots"].values())
-    for name in ("x / m", "y / m", "yaw / °", "acceptance", "overlap", *(["confidence"] if known else [])):
+    scaled = report["settings"]["merge"]["scale"] == "free"
+    pose = ("x / m", "y / m", "yaw / °", *(["scale"] if scaled else []))
+    for name in (*pose, "acceptance", "overlap", *(["confidence"] if known else [])):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("reason", overflow="fold")
     for robot, row in report["robots"].items():
@@ -156,7 +158,7 @@ def print_table(console: Console, report: Report) -> None:
         table.add_row(
             Text(robot),
             Text(status, style=_STYLES[status]),
-            *_pose(row["merged_from_map"]),
+            *_pose(row["merged_from_map"])[: len(pose)],
             _share(row["acceptance"], 3),
             _figure(row["overlap_m2"], "{:.1f} m²"),
             *([_share(row["confidence"], 4)] if known else []),
@@ -165,10 +167,11 @@ def print_table(console: Console, report: Report) -> None:
     console.print(table)
 
 
-def _pose(pose: dict[str, float] | None) -> tuple[str, str, str]:
+def _pose(pose: dict[str, float] | None) -> tuple[str, ...]:
     if pose is None:
-        return "–", "–", "–"
-    return f"{pose['x_m']:.2f}", f"{pose['y_m']:.2f}", f"{math.degrees(pose['yaw_rad']):.1f}"
+        return ("–",) * 4
+    turn_deg = math.degrees(pose["yaw_rad"])
+    return f"{pose['x_m']:.2f}", f"{pose['y_m']:.2f}", f"{turn_deg:.1f}", f"{pose['scale']:.3f}"
 
 
 def _share(value: float | None, digits: int) -> str:

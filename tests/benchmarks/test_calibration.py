@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import asdict, astuple, fields, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,37 +11,37 @@ import pytest
 
 from benchmarks import observations
 from benchmarks.bends import MOST_M, bent, random_bend
-from benchmarks.calibrate import AGAINST, BY_RULE, Model, balanced, cue_array, fitted, source_of, statement
-from benchmarks.observations import BLOCK, Job, Observation, errors, groups, jobs, observed, read
+from benchmarks.calibrate import by_group, source_of, stated, statement
+from benchmarks.fitting import AGAINST, KNOTS, Model, Models, balanced, fit_array, fitted, fitted_odds
+from benchmarks.fitting import CONTEST as CONTEST_CUES
+from benchmarks.fitting import FIT as FIT_CUES
+from benchmarks.observations import BLOCK, Candidate, Job, Observation, errors, groups, jobs, observed, read
+from mapmerge.config import VerifyConfig
 from mapmerge.match import calibration
-from mapmerge.match.calibration import CURVES
-from mapmerge.match.confidence import HIGHEST, Curve, confidence
-from mapmerge.match.cues import Cues
+from mapmerge.match.confidence import additive, confidence, contest, odds
+from mapmerge.match.weigh import likeliest_first
 from mapmerge.sim2 import Sim2
 from samples.kinds import KINDS
 from samples.pairs import Pair
+from tests.cues import FIT
 from tests.floors import WALL, flat, walled_room
 
-NAMES = [cue.name for cue in fields(Cues)]
-CUES = Cues(
-    matched_wall_m=45.0,
-    wall_agreement=0.95,
-    other_wall_agreement=0.97,
-    far_share=0.01,
-    slack_agreement=0.97,
-    bend_m=0.05,
-    likeness=0.2,
-    lead_m=48.0,
-    clearance=3.0,
-    rival_agreement=0.4,
-    acceptance=0.98,
-    overlap_m2=40.0,
-    overlap_fraction=0.6,
-    aligned=0.95,
-    held_m=15.0,
-    tight_share=0.9,
+SEEN = Observation(
+    "a pair",
+    "recorded",
+    False,
+    True,
+    False,
+    0.4,
+    False,
+    (Candidate(0.1, 0.01, 0.0, FIT), Candidate(9.0, 3.0, 3.1, FIT)),
 )
-SEEN = Observation("a pair", "recorded", False, True, False, 0.4, False, 0.1, 0.01, CUES)
+
+
+def off(item, **changes):
+    """Return an observation whose first candidate is changed."""
+    first, *others = item.candidates
+    return replace(item, candidates=(replace(first, **changes), *others))
 
 
 class TestObservation:
@@ -57,11 +57,15 @@ class TestObservation:
         ],
     )
     def test_is_right_where_maps_that_belong_together_lie_as_they_should(self, change, right):
-        assert replace(SEEN, **change).right is right
+        errors_of = {key: value for key, value in change.items() if key.startswith("error")}
+        others = {key: value for key, value in change.items() if key not in errors_of}
+        found = replace(off(SEEN, **errors_of), **others)
+        assert found.right is right
+        assert not found.is_right(found.candidates[1])
 
     def test_is_read_as_it_was_written(self, tmp_path):
         path = tmp_path / "seen.jsonl"
-        others = [SEEN, replace(SEEN, name="another", group="office", error_m=3.0)]
+        others = [SEEN, off(replace(SEEN, name="another", group="office"), error_m=3.0)]
         path.write_text("".join(json.dumps(asdict(item)) + "\n" for item in others), encoding="utf-8")
         assert read(path) == others
         assert Observation.parse(json.dumps(asdict(SEEN))) == SEEN
@@ -88,13 +92,17 @@ class TestJobs:
         monkeypatch.setattr(observations, "strangers", lambda kind, seed, what: stranger(f"{kind}-{seed}-{what}"))
         monkeypatch.setattr(observations, "CROSSED_A_BLOCK", 3)
         monkeypatch.setattr(observations, "BENT_SHARE", 0.0)
+        monkeypatch.setattr(observations, "TWINS_A_MISSION", 2)
         found = observed(Job("office", BLOCK))
         assert [item.name for item in found if item.held_out] == [
             "office-7",
-            "office-7-next floor",
-            "office-7-next wing",
+            "office-1007-next floor",
+            "office-1007-next wing",
+            "office-2007-next floor",
+            "office-2007-next wing",
         ]
-        assert len(found) == 3 * BLOCK + 3
+        assert len(found) == 5 * BLOCK + 3
+        assert all(item.candidates[0].turn_rad == 0.0 for item in found)
         assert all(
             item.right == item.related == item.name.startswith("office-") & ("next" not in item.name) for item in found
         )
@@ -141,96 +149,121 @@ class TestBends:
         assert none.of(grid).same_as(grid)
 
 
-def chance_of(cues):
-    log_odds = -3.0 + 0.12 * cues[:, NAMES.index("overlap_m2")] - 30.0 * cues[:, NAMES.index("far_share")]
-    return 1.0 / (1.0 + np.exp(-log_odds))
+def drawn_fit(rng):
+    """Return figures of which two tell how likely a placement is, and one does not."""
+    return replace(
+        FIT,
+        overlap_m2=float(rng.uniform(1.0, 60.0)),
+        far_share=float(rng.uniform(0.0, 0.1)),
+        held_m=float(rng.uniform(1.0, 40.0)),
+    )
+
+
+def odds_of(fit):
+    return -3.0 + 0.12 * fit.overlap_m2 - 30.0 * fit.far_share
 
 
 @pytest.fixture(scope="module")
-def known():
-    """Cues, the chance of being right that they mean, and a draw for each."""
+def seen():
+    """Observations of two or three candidates, one of which is right, or none, as their odds would have it."""
     rng = np.random.default_rng(3)
-    cues = np.tile(np.array(astuple(CUES)), (3000, 1))
-    cues[:, NAMES.index("overlap_m2")] = rng.uniform(1.0, 60.0, len(cues))
-    cues[:, NAMES.index("far_share")] = rng.uniform(0.0, 0.1, len(cues))
-    cues[:, NAMES.index("held_m")] = rng.uniform(1.0, 40.0, len(cues))
-    return cues, chance_of(cues), rng.uniform(size=len(cues))
+    found = []
+    for number in range(3000):
+        fits = [drawn_fit(rng) for _ in range(2 + number % 2)]
+        chances = np.exp([0.0, *map(odds_of, fits)])
+        right = int(rng.choice(len(chances), p=chances / chances.sum())) - 1
+        candidates = tuple(Candidate(0.0 if row == right else 9.0, 0.0, 0.0, fit) for row, fit in enumerate(fits))
+        group = "recorded" if number % 3 else "office"
+        found.append(Observation(f"pair {number}", group, False, True, False, 0.5, False, candidates))
+    return found
 
 
 @pytest.fixture(scope="module")
-def model(known):
-    cues, chance, drawn_at = known
-    return fitted(cues, drawn_at < chance, np.ones(len(cues)))
+def models(seen):
+    return fitted(seen)
 
 
 class TestFit:
-    """Of placements whose chance of being right is known: it rises with one cue and falls with another."""
+    """Of candidates whose odds are known: they rise with one cue and fall with another."""
 
-    def test_recovers_it(self, known, model):
-        cues, chance, _ = known
-        off = np.abs(model.confidence(cues) - chance)
-        assert off.mean() < 0.03
-        assert np.quantile(off, 0.95) < 0.1
+    def test_recovers_the_odds(self, seen, models):
+        values, there, _ = fit_array(seen[:400])
+        known = np.array([odds_of(item.fit) for pair in seen[:400] for item in pair.candidates])
+        gap = models.odds.log_odds(values)[there] - known
+        assert np.abs(gap).mean() < 0.35
 
-    def test_what_does_not_matter_adds_little(self, model):
-        totals = {name: abs(rises.sum()) for name, rises in zip(NAMES, model.rises, strict=True)}
+    def test_is_calibrated(self, seen, models):
+        sure, right = stated(seen, models)
+        for low, high in ((0.0, 0.5), (0.5, 0.8), (0.8, 1.0)):
+            within = (sure >= low) & (sure < high)
+            assert within.sum() > 100
+            assert right[within].mean() == pytest.approx(sure[within].mean(), abs=0.04)
+
+    def test_what_does_not_matter_adds_little(self, models):
+        totals = {name: abs(rises.sum()) for name, rises in zip(FIT_CUES, models.odds.rises, strict=True)}
         assert totals["overlap_m2"] > 4.0
-        assert totals["far_share"] > 2.0
-        assert totals["held_m"] < 0.6
+        assert totals["far_share"] > 1.5
+        assert totals["held_m"] < 0.5
 
-    def test_never_rises_against_what_a_cue_says(self, known):
+    def test_never_rises_against_what_a_cue_says(self, seen):
         """Whatever was seen, such as the very contrary."""
-        cues, chance, drawn_at = known
-        for right in (drawn_at < chance, drawn_at > chance):
-            model = fitted(cues, right, np.ones(len(cues)))
-            for name, knots, rises in zip(NAMES, model.knots, model.rises, strict=True):
-                assert (np.diff(knots) > 0.0).all()
+        values, there, right = fit_array(seen[:600])
+        for chosen in (right, there & ~right):
+            model = fitted_odds(values, there, chosen, np.ones(len(values)))
+            for name, rises in zip(model.cues, model.rises, strict=True):
                 assert (rises * (-1.0 if name in AGAINST else 1.0) >= 0.0).all(), name
-                assert name != BY_RULE or not rises.any()
 
-    def test_is_what_the_library_computes_from_its_text(self, known, model, monkeypatch):
-        text = source_of(model)
+    def test_is_what_the_library_computes_from_its_text(self, seen, models, monkeypatch):
         read_back = {}
-        exec(text, read_back)  # noqa: S102
-        assert read_back["INTERCEPT"] == pytest.approx(model.intercept, abs=1e-4)
-        assert list(read_back["CURVES"]) == NAMES
-        for (knots, rises), mine, my_rises in zip(read_back["CURVES"].values(), model.knots, model.rises, strict=True):
-            assert knots == pytest.approx(mine, abs=1e-4)
-            assert rises == pytest.approx(my_rises, abs=1e-4)
-        curves = {name: Curve(*values) for name, values in read_back["CURVES"].items()}
-        monkeypatch.setattr("mapmerge.match.confidence._CURVES", curves)
-        monkeypatch.setattr("mapmerge.match.confidence.INTERCEPT", read_back["INTERCEPT"])
-        for row in known[0][:50]:
-            assert confidence(Cues(*row.tolist())) == pytest.approx(
-                min(HIGHEST, float(model.confidence(row[None])[0])), abs=2e-3
-            )
+        exec(source_of(models), read_back)  # noqa: S102
+        monkeypatch.setattr("mapmerge.match.confidence._ODDS", additive(read_back["ODDS"]))
+        monkeypatch.setattr("mapmerge.match.confidence._CONFIDENCE", additive(read_back["CONFIDENCE"]))
+        sure, _ = stated(seen[:50], models)
+        for item, mine in zip(seen, sure.tolist(), strict=False):
+            fits = [candidate.fit for candidate in item.candidates]
+            log_odds = [odds(fit) for fit in fits]
+            order = likeliest_first(fits, log_odds, VerifyConfig())
+            standing = contest([fits[row] for row in order], [log_odds[row] for row in order])
+            assert confidence(standing) == pytest.approx(mine, abs=2e-3)
 
 
 class TestCalibration:
-    def test_has_a_curve_of_every_cue(self):
-        assert set(CURVES) == set(NAMES)
-        for name, (knots, rises) in CURVES.items():
+    @pytest.mark.parametrize(("table", "cues"), [(calibration.ODDS, FIT_CUES), (calibration.CONFIDENCE, CONTEST_CUES)])
+    def test_has_a_curve_of_every_cue_that_goes_its_way(self, table, cues):
+        _, curves = table
+        assert tuple(curves) == cues
+        for name, (knots, rises) in curves.items():
+            assert knots == KNOTS[name]
             assert len(knots) == len(rises) + 1
             assert list(knots) == sorted(set(knots))
             assert all(rise * (-1.0 if name in AGAINST else 1.0) >= 0.0 for rise in rises), name
-        assert not any(CURVES[BY_RULE][1])
 
     def test_was_written_by_the_program_that_writes_it(self):
-        knots, rises = zip(*CURVES.values(), strict=True)
-        model = Model(tuple(map(np.array, knots)), tuple(map(np.array, rises)), calibration.INTERCEPT)
-        assert source_of(model) == Path(calibration.__file__).read_text(encoding="utf-8")
+        written = Models(*(model_of(table) for table in (calibration.ODDS, calibration.CONFIDENCE)))
+        assert source_of(written) == Path(calibration.__file__).read_text(encoding="utf-8")
 
     def test_groups_count_as_much(self):
         others = [SEEN, *(replace(SEEN, group="office", name=str(number)) for number in range(4))]
         assert balanced(others).tolist() == [1.0, 0.25, 0.25, 0.25, 0.25]
 
     def test_says_how_many_of_the_accepted_are_wrong(self):
-        found = [SEEN, replace(SEEN, error_m=9.0), replace(SEEN, group="office")]
-        lines = statement(found, np.array([0.999, 0.995, 0.5]), 0.99)
-        assert cue_array(found).shape == (3, len(NAMES))
-        assert "2 accepted,   1 wrong" in next(line for line in lines if line.split()[0] == "recorded")
-        assert "0 accepted,   0 wrong" in next(line for line in lines if line.split()[0] == "office")
-        assert "0.3–0.5: 1/3" in lines[-1]
+        found = [SEEN, off(SEEN, error_m=9.0), replace(SEEN, group="office"), replace(SEEN, ambiguous=True)]
+        right = np.array([item.right for item in found])
+        sure = np.array([0.999, 0.995, 0.5, 0.999])
+        at_90, at_999 = (line.split() for line in statement(found, sure, right, [0.9, 0.999])[1:])
+        assert at_90[:3] == ["0.9", "2", "1"]
+        assert at_999[:3] == ["0.999", "1", "0"]
+        assert "0.3–0.5: 1/3" in " ".join(at_90)
+        assert " ".join(at_90).endswith("0 of 1 wrong")
+        assert by_group(found, sure, right, 0.9) == [
+            "  office         0 accepted,   0 wrong",
+            "  recorded       2 accepted,   1 wrong",
+        ]
+
+
+def model_of(table):
+    intercept, curves = table
+    return Model(tuple(curves), tuple(np.array(rises) for _, rises in curves.values()), intercept)
 
 
 THERE = Sim2(-3.0, -2.0, 0.31)

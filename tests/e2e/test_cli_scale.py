@@ -29,6 +29,8 @@ def test_a_wrong_resolution_is_made_up_for(replay: Program, factor: float) -> No
     pose = found["merged_from_map"]
     assert pose["scale"] == pytest.approx(1.0 / factor, rel=0.01)
     assert is_right({**pose, "scale": pose["scale"] * factor}, reference_from("r2"))
+    assert "scale" in ran.out
+    assert f"{pose['scale']:.3f}" in ran.out
     assert found["acceptance"] > 0.9
     assert found["overlap_m2"] == pytest.approx(FLAT_M2, rel=0.1)
     # the merged map is the reference's, with what r2 adds at the size that it truly has
@@ -48,3 +50,4 @@ def test_is_believed_without_it(replay: Program) -> None:
     """A map of twice the size fits nowhere, and no placement has a scale."""
     ran = replay.merge(write_mcap(replay.folder / "run.mcap", mislabelled(2.0)))
     assert ran.statuses == {"r1": "reference", "r2": "unmerged"}
+    assert "scale" not in ran.out

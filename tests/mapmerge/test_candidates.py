@@ -46,7 +46,7 @@ class TestTruth:
     def test_is_among_those_of_the_sweep(self, place):
         pair, truth, at_m = known_pair(place)
         found = by_sweep(pair, SEARCH)
-        assert len(found) <= 2 * SEARCH.max_candidates * len(SEARCH.sweep_free_weights)
+        assert len(found) <= SEARCH.sweep_candidates * len(SEARCH.sweep_free_weights)
         assert least_error_m(found, truth, at_m) < 0.5
 
     def test_is_among_those_turned_by_half_from_the_other_half(self, place):

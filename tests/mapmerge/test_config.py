@@ -41,7 +41,7 @@ class TestNumbers:
         with pytest.raises(ConfigError, match="reject_m"):
             RefineConfig(reject_m=reject_m)
 
-    @pytest.mark.parametrize("value", [1.001, 99.9])
+    @pytest.mark.parametrize("value", [0.99991, 1.0, 1.001, 99.9])
     def test_a_confidence_is_a_probability(self, value):
         with pytest.raises(ConfigError, match="min_confidence"):
             VerifyConfig(min_confidence=value)

@@ -240,7 +240,7 @@ class TestPrior:
         true = pair.target_from_source
         match = matched(pair.target, pair.source, CONFIG, believed(Sim2(true.x_m + 0.4, true.y_m, true.yaw_rad)))
         assert pair.errors(match.target_from_source)[0] < 0.25 * BAY_M
-        assert match.cues.likeness < 0.5
+        assert match.cues.contest.lead_odds > 1.0
 
     @pytest.mark.parametrize("swapped", [False, True])
     def test_that_the_maps_contradict(self, swapped):

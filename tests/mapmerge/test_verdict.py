@@ -7,12 +7,12 @@ import pytest
 
 from mapmerge.config import VerifyConfig
 from mapmerge.match import Match, Rival
-from mapmerge.match.cues import Cues
 from mapmerge.match.verdict import contradicted, judge, too_little_structure
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
 from mapmerge.verify import Scores
+from tests.cues import CUES
 from tests.floors import described, errors, filled, flat, pair_of_maps
 
 LIMITS = VerifyConfig()
@@ -26,24 +26,11 @@ GOOD = Scores(
     matched_wall_m=45.0,
     violated_wall_m=1.0,
 )
-CUES = Cues(
-    matched_wall_m=45.0,
-    wall_agreement=0.95,
-    other_wall_agreement=0.97,
-    far_share=0.01,
-    slack_agreement=0.97,
-    bend_m=0.05,
-    likeness=0.2,
-    lead_m=48.0,
-    clearance=3.0,
-    rival_agreement=0.4,
-    acceptance=0.98,
-    overlap_m2=40.0,
-    overlap_fraction=0.6,
-    aligned=0.95,
-    held_m=15.0,
-    tight_share=0.9,
-)
+
+
+def among(**contest):
+    """Return the cues with another standing among rivals."""
+    return replace(CUES, contest=replace(CUES.contest, **contest))
 
 
 class TestJudge:
@@ -71,13 +58,15 @@ class TestJudge:
             ({"wall_agreement": 0.7}, {}, ReasonCode.WALLS_DISAGREE, "70%"),
             ({"wall_agreement": 0.79}, {}, ReasonCode.WALLS_DISAGREE, "79%"),
             ({"score_m": -3.0}, {}, ReasonCode.WALLS_DISAGREE, "95%"),
-            ({"wall_agreement": 0.7}, {"likeness": 0.9}, ReasonCode.WALLS_DISAGREE, "70%"),
-            ({}, {"likeness": 0.9}, ReasonCode.AMBIGUOUS, "0.90 times"),
+            ({"wall_agreement": 0.7}, {"lead_odds": 0.1}, ReasonCode.WALLS_DISAGREE, "70%"),
+            ({}, {"lead_odds": 0.1}, ReasonCode.AMBIGUOUS, "0.90 times as likely"),
+            ({}, {"lead_odds": -3.0}, ReasonCode.AMBIGUOUS, "1.00 times as likely"),
+            ({}, {"lead_odds": 2.99}, ReasonCode.AMBIGUOUS, "0.050 times as likely"),
             ({}, {}, ReasonCode.LOW_CONFIDENCE, "40 m²"),
         ],
     )
     def test_says_what_speaks_most_against_what_is_not_sure(self, scores, cues, code, says):
-        reason = judge(replace(GOOD, **scores), replace(CUES, **cues), 0.42, LIMITS)
+        reason = judge(replace(GOOD, **scores), among(**cues), 0.42, LIMITS)
         assert reason.code is code
         assert says in reason.message
         assert "42 %" in reason.message
@@ -87,7 +76,7 @@ class TestJudge:
         assert judge(replace(GOOD, **exactly), CUES, SURE, LIMITS).code is ReasonCode.ACCEPTED
 
     def test_only_the_confidence_decides_over_what_is_large_enough_and_not_hopeless(self):
-        poor = replace(GOOD, wall_agreement=0.71), replace(CUES, likeness=0.99, rival_agreement=0.9)
+        poor = replace(GOOD, wall_agreement=0.71), among(likeness=0.99, lead_odds=0.0)
         assert judge(*poor, SURE, LIMITS).code is ReasonCode.ACCEPTED
 
     @pytest.mark.parametrize("confidence", [0.1, 1.0])
@@ -96,10 +85,9 @@ class TestJudge:
         assert reason.code is ReasonCode.WALLS_DISAGREE
         assert "69% agree, less than 70%" in reason.message
 
-    def test_a_rival_whose_walls_agree_as_well_contests_it_however_much_less_it_scores(self):
-        reason = judge(GOOD, replace(CUES, rival_agreement=0.96), 0.5, LIMITS)
-        assert reason.code is ReasonCode.AMBIGUOUS
-        assert "0.96" in reason.message
+    @pytest.mark.parametrize(("lead_odds", "says"), [(12.0, "less than 0.001"), (5.0, "0.007"), (1.0, "0.37")])
+    def test_says_how_likely_the_next_best_is(self, lead_odds, says):
+        assert f"{says} times as likely" in judge(GOOD, among(lead_odds=lead_odds), SURE, LIMITS).message
 
     @pytest.mark.parametrize("change", [{"overlap_m2": 5.97}, {"matched_wall_m": 7.999}])
     def test_a_near_miss_does_not_read_like_a_contradiction(self, change):

@@ -6,104 +6,99 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapmerge.match.confidence import confidence
-from mapmerge.match.cues import Cues, clearance
+from mapmerge.match.confidence import confidence, contest, odds
+from mapmerge.match.cues import Fit
 
 shares = st.floats(0.0, 1.0)
 lengths_m = st.floats(0.0, 500.0)
+ROUNDING = 1e-12
 
 
 @st.composite
-def cues_of_some_placement(draw):
-    worse, better = sorted((draw(shares), draw(shares)))
-    matched_wall_m, lead_m, slack_agreement = draw(lengths_m), draw(lengths_m), max(worse, draw(shares))
-    return Cues(
-        matched_wall_m=matched_wall_m,
-        wall_agreement=worse,
-        other_wall_agreement=better,
-        far_share=draw(shares) * (1 - worse),
-        slack_agreement=slack_agreement,
-        bend_m=draw(st.floats(0.0, 2.0)),
-        likeness=draw(shares),
-        lead_m=lead_m,
-        clearance=clearance(lead_m, matched_wall_m, slack_agreement),
-        rival_agreement=draw(shares),
+def fits(draw):
+    score_m, contradicted_m = draw(st.floats(-200.0, 800.0)), draw(lengths_m)
+    return Fit(
+        score_m=score_m,
+        contradicted_m=contradicted_m,
+        matched_wall_m=draw(lengths_m),
+        slack_agreement=draw(shares),
+        far_share=draw(shares),
+        slack_far_share=draw(shares),
+        solidity=solidity(score_m, contradicted_m),
         acceptance=draw(shares),
         overlap_m2=draw(st.floats(0.0, 5000.0)),
         overlap_fraction=draw(shares),
         aligned=draw(st.floats(-1.0, 1.0)),
         held_m=draw(lengths_m),
-        tight_share=draw(shares),
     )
 
 
-anything = cues_of_some_placement()
-ROUNDING = 1e-12
+def solidity(score_m, contradicted_m):
+    return math.log((1.0 + max(0.0, score_m)) / (1.0 + contradicted_m))
 
 
-def changed(cues, **changes):
-    """Return other cues, with the clearance that follows."""
-    new = replace(cues, **changes)
-    return replace(new, clearance=clearance(new.lead_m, new.matched_wall_m, new.slack_agreement))
+def sure(first, others=()):
+    """Return the confidence of the first of some placements."""
+    everything = [first, *others]
+    return confidence(contest(everything, [odds(fit) for fit in everything]))
 
 
-@given(anything)
-def test_is_a_probability(cues):
-    assert math.isfinite(confidence(cues))
-    assert 0.0 <= confidence(cues) <= 1.0
-
-
-@given(anything, shares)
-def test_more_agreement_never_lowers_it(cues, share):
-    """Of both directions together: the worse one stays the worse one."""
-    more = cues.wall_agreement + share * (1.0 - cues.wall_agreement)
-    better = changed(
-        cues,
-        wall_agreement=more,
-        other_wall_agreement=max(more, cues.other_wall_agreement),
-        slack_agreement=max(more, cues.slack_agreement),
+def better(fit, share):
+    """Return the same with more agreement and less against it."""
+    contradicted_m = fit.contradicted_m * (1.0 - share)
+    return replace(
+        fit,
+        slack_agreement=fit.slack_agreement + share * (1.0 - fit.slack_agreement),
+        contradicted_m=contradicted_m,
+        far_share=fit.far_share * (1.0 - share),
+        slack_far_share=fit.slack_far_share * (1.0 - share),
+        solidity=solidity(fit.score_m, contradicted_m),
     )
-    assert confidence(better) >= confidence(cues) - ROUNDING
 
 
-@given(anything, shares)
-def test_walls_amid_free_space_never_raise_it(cues, share):
-    worse = changed(cues, far_share=cues.far_share + share * (1.0 - cues.far_share))
-    assert confidence(worse) <= confidence(cues) + ROUNDING
-
-
-@given(anything, shares)
-def test_a_rival_that_is_more_alike_never_raises_it(cues, share):
-    """Its score comes nearer, so that the lead shrinks."""
-    likeness = cues.likeness + share * (1.0 - cues.likeness)
-    lead_m = cues.lead_m * (1.0 - likeness) / max(1.0 - cues.likeness, 1e-9)
-    rival = changed(cues, likeness=likeness, lead_m=min(lead_m, cues.lead_m))
-    assert confidence(rival) <= confidence(cues) + ROUNDING
-
-
-@given(anything, shares)
-def test_a_rival_that_agrees_better_never_raises_it(cues, share):
-    rival = changed(cues, rival_agreement=cues.rival_agreement + share * (1.0 - cues.rival_agreement))
-    assert confidence(rival) <= confidence(cues) + ROUNDING
-
-
-@given(anything.filter(lambda cues: cues.clearance >= 0.0), st.floats(1.0, 5.0))
-def test_more_of_the_same_never_lowers_it(cues, factor):
-    """Larger maps that agree as well as these: more wall, more ground, a larger lead, firmer hold.
-
-    Where more speaks against a placement than it leads by, more of the same is more against it.
-    """
-    larger = changed(
-        cues,
-        matched_wall_m=cues.matched_wall_m * factor,
-        held_m=cues.held_m * factor,
-        lead_m=cues.lead_m * factor,
-        overlap_m2=cues.overlap_m2 * factor,
+def larger(fit, factor):
+    """Return the same fit of maps that are so many times as large."""
+    score_m, contradicted_m = fit.score_m * factor, fit.contradicted_m * factor
+    return replace(
+        fit,
+        score_m=score_m,
+        contradicted_m=contradicted_m,
+        matched_wall_m=fit.matched_wall_m * factor,
+        solidity=solidity(score_m, contradicted_m),
+        overlap_m2=fit.overlap_m2 * factor,
+        held_m=fit.held_m * factor,
     )
-    assert confidence(larger) >= confidence(cues) - ROUNDING
 
 
-@given(anything, st.floats(0.999, 1.0))
-def test_of_two_placements_that_are_as_good_one_is_wrong(cues, likeness):
+@given(fits(), st.lists(fits(), max_size=4))
+def test_is_a_probability(fit, others):
+    assert 0.0 <= sure(fit, others) <= 1.0
+
+
+@given(fits(), st.lists(fits(), max_size=4), shares)
+def test_less_against_it_never_lowers_it(fit, others, share):
+    assert odds(better(fit, share)) >= odds(fit) - ROUNDING
+    assert sure(better(fit, share), others) >= sure(fit, others) - ROUNDING
+
+
+@given(fits(), fits(), st.lists(fits(), max_size=3), shares)
+def test_a_rival_with_less_against_it_never_raises_it(fit, rival, others, share):
+    assert sure(fit, [better(rival, share), *others]) <= sure(fit, [rival, *others]) + ROUNDING
+
+
+@given(fits(), st.lists(fits(), max_size=3), fits())
+def test_one_more_rival_never_raises_it(fit, others, rival):
+    assert sure(fit, [*others, rival]) <= sure(fit, others) + ROUNDING
+
+
+@given(fits().filter(lambda fit: fit.score_m >= fit.contradicted_m), st.floats(1.0, 5.0))
+def test_more_of_the_same_never_lowers_it(fit, factor):
+    """Where more speaks against a placement than for it, more of the same is more against it."""
+    assert odds(larger(fit, factor)) >= odds(fit) - ROUNDING
+    assert sure(larger(fit, factor)) >= sure(fit) - ROUNDING
+
+
+@given(fits(), st.lists(fits(), max_size=3))
+def test_of_two_placements_that_are_as_likely_one_is_wrong(fit, others):
     """However well both fit."""
-    assert confidence(changed(cues, likeness=likeness, lead_m=0.0)) <= 0.51
+    assert sure(fit, [fit, *others]) <= 0.5 + ROUNDING

@@ -1,0 +1,74 @@
+"""Candidates weighed against each other: at most one placement of a pair is right."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapmerge.align import placement_of
+from mapmerge.config import MergeConfig, VerifyConfig
+from mapmerge.match.confidence import contest, odds
+from mapmerge.match.cues import Contest, Fit, fit_of
+from mapmerge.match.look import Look
+from mapmerge.match.pair import PairOfMaps
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Weighed:
+    """Distinct placements between the grid frames, the likeliest first.
+
+    Parameters
+    ----------
+    look
+        The placements.
+    fits
+        How well the maps fit at each.
+    log_odds
+        See `mapmerge.match.confidence.odds`.
+    """
+
+    look: Look
+    fits: tuple[Fit, ...]
+    log_odds: tuple[float, ...]
+
+    @property
+    def contest(self) -> Contest:
+        """How the first one stands among them."""
+        return contest(self.fits, self.log_odds)
+
+
+def weighed(pair: PairOfMaps, ranked: Look, config: MergeConfig) -> Weighed:
+    """Return the best of some distinct placements, likeliest first.
+
+    A score in metres prefers the placement that lets two maps overlap most; the likeliest one may share less ground,
+    and be contradicted by less. Placements that share too little to be accepted come last: they have hardly any
+    overlap, and so hardly anything against them, and say nothing of why maps do not fit.
+
+    Parameters
+    ----------
+    pair
+        The maps.
+    ranked
+        Placements, the largest score first.
+    config
+        Settings.
+    """
+    limits = config.search
+    worth = ranked.scores_m >= limits.worth_weighing * max(0.0, float(ranked.scores_m[0]))
+    rows = np.flatnonzero(worth)[: limits.weighed].tolist()
+    chosen = ranked.rows(rows or [0])
+    fits = [fit_of(pair, placement_of(pose), config) for pose in chosen.poses]
+    log_odds = [odds(fit) for fit in fits]
+    order = likeliest_first(fits, log_odds, config.verify)
+    return Weighed(chosen.rows(order), tuple(fits[row] for row in order), tuple(log_odds[row] for row in order))
+
+
+def likeliest_first(fits: Sequence[Fit], log_odds: Sequence[float], config: VerifyConfig) -> list[int]:
+    """Return the order of placements: by their odds, but last those that share less than an accepted one must."""
+
+    def is_poor(fit: Fit) -> bool:
+        return fit.overlap_m2 < config.min_overlap_m2 or fit.matched_wall_m < config.min_matched_wall_m
+
+    return sorted(range(len(fits)), key=lambda row: (is_poor(fits[row]), -log_odds[row]))
