@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.fitting import KNOTS, Array, Models, fitted, reweighed
+from benchmarks.fitting import KNOTS, Array, Models, fit_array, fitted, standings
 from benchmarks.observations import Observation, groups, read
 from benchmarks.reliability import binned, diagram, wilson
 from mapmerge.config import MergeConfig
@@ -50,42 +51,80 @@ def _row(cue: str, rises: Array) -> list[str]:
     return [f'        "{cue}": (', f"            ({at}),", f"            ({up}),", "        ),"]
 
 
-def stated(found: Sequence[Observation], models: Models) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the confidence of the likeliest candidate of each observation, and whether it is right."""
-    cues, right = reweighed(found, models.odds)
-    lead = cues[:, models.confidence.cues.index("lead_odds")]
-    log_odds = models.confidence.log_odds(cues)
-    return np.array([stated_confidence(*pair) for pair in zip(log_odds.tolist(), lead.tolist(), strict=True)]), right
+@dataclass(frozen=True, slots=True, eq=False)
+class Stated:
+    """What the models say of observations.
+
+    Parameters
+    ----------
+    sure
+        Confidence of what is offered of each; 0 where nothing is, or where it shares or agrees too little.
+    right
+        Whether that is right.
+    """
+
+    sure: Array
+    right: NDArray[np.bool_]
 
 
-def statement(
-    found: Sequence[Observation], sure: Array, right: NDArray[np.bool_], thresholds: Sequence[float]
-) -> list[str]:
+def stated(found: Sequence[Observation], models: Models) -> Stated:
+    """Return the confidence of what is offered of each observation, and whether it is right."""
+    values, there, _ = fit_array(found)
+    offered, right = standings(found, np.where(there, models.odds.log_odds(values), -np.inf))
+    additive = models.confidence.additive
+    sure = [
+        stated_confidence(additive.log_odds(item.contest), item.contest.crowd)
+        if item.contest and item.is_enough
+        else 0.0
+        for item in offered
+    ]
+    return Stated(np.array(sure, np.float64), right)
+
+
+def statement(found: Sequence[Observation], said: Stated, thresholds: Sequence[float]) -> list[str]:
     """Return what can be said of the placements that a confidence accepts, ambiguous pairs apart."""
     ambiguous = np.array([item.ambiguous for item in found])
-    lines = [
-        f"  {'least':<7} {'accepted':>8} {'wrong':>5}  {'95 % bound':<10}  {'placed rightly by overlap':<40} ambiguous"
-    ]
+    head = f"  {'least':<7} {'accepted':>8} {'wrong':>5}  {'95 % bound':<10}  {'buildings with a wrong one':<32}"
+    lines = [f"{head}  {'placed rightly by overlap':<42} ambiguous"]
     for least in thresholds:
-        taken = (sure >= least) & ~ambiguous
-        wrong = int((taken & ~right).sum())
+        taken = (said.sure >= least) & ~ambiguous
+        wrong = taken & ~said.right
         shares = " ".join(
-            f"{lo:g}–{min(hi, 1.0):g}: {_share(found, taken & right, ~ambiguous, lo, hi)}"
+            f"{lo:g}–{min(hi, 1.0):g}: {_share(found, taken & said.right, ~ambiguous, lo, hi)}"
             for lo, hi in ((0.1, 0.3), (0.3, 0.5), (0.5, 1.01))
         )
-        both = (sure >= least) & ambiguous
-        apart = f"{int((both & ~right).sum())} of {int(ambiguous.sum())} wrong"
-        bound = 1.0 - wilson(int((taken & right).sum()), int(taken.sum()))[0]
-        lines.append(f"  {least:<7g} {int(taken.sum()):>8} {wrong:>5}  {bound:<10.4f}  {shares:<40} {apart}")
+        both = (said.sure >= least) & ambiguous
+        apart = f"{int((both & ~said.right).sum())} of {int(ambiguous.sum())} wrong"
+        bound = f"{_bound(int(wrong.sum()), int(taken.sum())):.4f}"
+        places = f"{_buildings(found, wrong)} of {_buildings(found, taken)}"
+        places += f" (95 % bound {_bound(_buildings(found, wrong), _buildings(found, taken)):.3f})"
+        head = f"  {least:<7g} {int(taken.sum()):>8} {int(wrong.sum()):>5}  {bound:<10}  {places:<32}"
+        lines.append(f"{head}  {shares:<42} {apart}")
     return lines
 
 
-def by_group(found: Sequence[Observation], sure: Array, right: NDArray[np.bool_], least: float) -> list[str]:
+def _bound(wrong: int, count: int) -> float:
+    """Return what share may be wrong, if each is for itself."""
+    return 1.0 - wilson(count - wrong, count)[0]
+
+
+def _buildings(found: Sequence[Observation], chosen: NDArray[np.bool_]) -> int:
+    return len({item.building for item, is_chosen in zip(found, chosen.tolist(), strict=True) if is_chosen})
+
+
+def recall(found: Sequence[Observation]) -> str:
+    """Return how often the right placement is among those that were weighed."""
+    clear = [item for item in found if item.related and not item.ambiguous]
+    there = sum(item.right_one is not None for item in clear)
+    return f"the right placement is among those weighed in {there} of {len(clear)}"
+
+
+def by_group(found: Sequence[Observation], said: Stated, least: float) -> list[str]:
     """Return how many of each group are accepted, and how many of these are wrong, ambiguous pairs apart."""
     lines = []
     for name in groups(found):
-        taken = np.array([item.group == name and not item.ambiguous for item in found]) & (sure >= least)
-        lines.append(f"  {name:<10} {int(taken.sum()):>5} accepted, {int((taken & ~right).sum()):>3} wrong")
+        taken = np.array([item.group == name and not item.ambiguous for item in found]) & (said.sure >= least)
+        lines.append(f"  {name:<10} {int(taken.sum()):>5} accepted, {int((taken & ~said.right).sum()):>3} wrong")
     return lines
 
 
@@ -105,14 +144,16 @@ def main() -> None:
     everything = read(options.observations)
     fit = [item for item in everything if not item.held_out]
     held_out = [item for item in everything if item.held_out]
+    if not fit or not held_out:
+        parser.error(f"{options.observations}: expected buildings that are held out, and others; collect more missions")
     models = fitted(fit)
     least = MergeConfig().verify.min_confidence
     for title, items in (("fitted on", fit), ("held out", held_out)):
-        sure, right = stated(items, models)
-        print(f"\n{title}: {len(items)} pairs; of {int(right.sum())} the likeliest placement is right")
-        print("\n".join(statement(items, sure, right, sorted({*_THRESHOLDS, least}))))
-        print("\n".join(by_group(items, sure, right, least)))
-        print("\n".join(diagram(binned(zip(sure.tolist(), right.tolist(), strict=True)))))
+        said = stated(items, models)
+        print(f"\n{title}: {len(items)} pairs; {recall(items)} clear ones")
+        print("\n".join(statement(items, said, sorted({*_THRESHOLDS, least}))))
+        print("\n".join(by_group(items, said, least)))
+        print("\n".join(diagram(binned(zip(said.sure.tolist(), said.right.tolist(), strict=True)))))
     if options.write:
         Path(str(calibration.__file__)).write_text(source_of(models), encoding="utf-8")
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from benchmarks.observations import collect, jobs
+from benchmarks.data import VARIABLE, data_folder
+from benchmarks.observations import SEEDS_OF_MISSIONS, collect, jobs
 
 
 def main() -> None:
@@ -16,6 +17,12 @@ def main() -> None:
     parser.add_argument("--cuts", type=int, default=2000, help="cut pairs of recorded maps, and as many strangers")
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
+    if options.missions > SEEDS_OF_MISSIONS:
+        parser.error(f"--missions {options.missions}: seeds from {SEEDS_OF_MISSIONS} on are those of look-alike floors")
+    if options.cuts and data_folder() is None:
+        parser.error(
+            f"--cuts {options.cuts}: there are no recordings; set {VARIABLE} to their folder, or give --cuts 0"
+        )
     collect(jobs(options.missions, options.cuts), options.out, options.processes)
 
 

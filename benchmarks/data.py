@@ -9,6 +9,8 @@ from pathlib import Path
 
 from mapmerge.sim2 import Sim2
 
+VARIABLE = "REPLAY_DATA"
+
 
 @dataclass(frozen=True, slots=True)
 class Truth:
@@ -28,7 +30,7 @@ class Truth:
 
 def data_folder() -> Path | None:
     """Return the folder of recordings, ``$REPLAY_DATA`` or ``../shared/data`` from the checkout; None if absent."""
-    folder = Path(os.environ.get("REPLAY_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+    folder = Path(os.environ.get(VARIABLE, Path(__file__).resolve().parents[2] / "shared" / "data"))
     return folder if folder.is_dir() else None
 
 

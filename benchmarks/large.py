@@ -23,12 +23,14 @@ _HEADINGS_RAD = (0.4, 1.9)
 
 
 def large_pair(side_cells: int, seed: int = 1) -> tuple[Grid, Grid]:
-    """Return the maps of two robots of which each saw about two thirds of a floor of offices.
+    """Return the maps of two robots that went to about two thirds of the places of a floor of offices each.
+
+    Their grids are turned against the floor, and larger than it; each knows about half of it, of small floors less.
 
     Parameters
     ----------
     side_cells
-        Length of the floor's sides in cells of 0.05 m.
+        Length of the floor's sides, in cells of 0.05 m.
     seed
         Of the floor and the runs.
     """

@@ -17,12 +17,13 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.bends import BENT_SHARE, bent
-from benchmarks.recorded_cuts import cut_pairs, cut_strangers, unrelated
+from benchmarks.recorded_cuts import building, cut_pairs, cut_strangers, unrelated
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.match import load_matcher
 from mapmerge.match.cues import Fit
 from mapmerge.sim2 import Sim2, wrap_angle
+from samples.drive import NoWay
 from samples.kinds import KINDS
 from samples.pairs import Mission, Pair, Related, mission, pairs, strangers
 
@@ -35,7 +36,9 @@ RIGHT_M, RIGHT_RAD = 0.5, math.radians(3.0)
 BENT_RIGHT_M, BENT_RIGHT_RAD = 1.0, math.radians(5.0)
 _LEAST_OVERLAP = 0.08
 _CUTS_A_JOB = 100
-_SEEDS_OF_MISSIONS = 1000
+_BENT_BY_DRIFT_M = 0.15
+RECORDED, CROSSED = "recorded", "crossed"
+SEEDS_OF_MISSIONS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,21 +49,18 @@ class Candidate:
     ----------
     error_m, error_rad
         How far it is off amid the overlap; 0 of strangers.
-    turn_rad
-        By how much it is turned against the first one.
     fit
         How well the maps fit there.
     """
 
     error_m: float
     error_rad: float
-    turn_rad: float
     fit: Fit
 
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """The placements of one pair that were weighed, the likeliest first, and which of them is right.
+    """The placements of one pair that were weighed, and which of them is right.
 
     Parameters
     ----------
@@ -68,6 +68,8 @@ class Observation:
         Of the pair.
     group
         Kind of simulated building, or "recorded".
+    building
+        What the pair has in common with others: pairs of one building are not independent.
     held_out
         Whether its building is held out of the fit.
     related
@@ -77,13 +79,14 @@ class Observation:
     overlap
         True share of the smaller map that both know.
     bent
-        Whether the maps were bent.
+        Whether the maps were bent, or drift bent them by as much.
     candidates
-        What was weighed; the first one is what the method offered.
+        What was weighed, in the order in which the method of that day put it; none if it found no placement at all.
     """
 
     name: str
     group: str
+    building: str
     held_out: bool
     related: bool
     ambiguous: bool
@@ -91,15 +94,15 @@ class Observation:
     bent: bool
     candidates: tuple[Candidate, ...]
 
-    def is_right(self, candidate: Candidate) -> bool:
-        """Tell whether a placement is the true one, give or take what a bent map leaves open."""
-        limits = (BENT_RIGHT_M, BENT_RIGHT_RAD) if self.bent else (RIGHT_M, RIGHT_RAD)
-        return self.related and candidate.error_m <= limits[0] and candidate.error_rad <= limits[1]
-
     @property
-    def right(self) -> bool:
-        """Whether the placement that the method offered is right."""
-        return self.is_right(self.candidates[0])
+    def right_one(self) -> int | None:
+        """Which candidate is right: the nearest to the truth, if it is the true one but for what bends leave open."""
+        if not self.related or not self.candidates:
+            return None
+        limit_m, limit_rad = (BENT_RIGHT_M, BENT_RIGHT_RAD) if self.bent else (RIGHT_M, RIGHT_RAD)
+        shares = [max(item.error_m / limit_m, item.error_rad / limit_rad) for item in self.candidates]
+        nearest = min(range(len(shares)), key=shares.__getitem__)
+        return nearest if shares[nearest] <= 1.0 else None
 
     @staticmethod
     def parse(line: str) -> Observation:
@@ -120,18 +123,17 @@ class Job:
 def jobs(missions: int, cuts: int) -> list[Job]:
     """Return all work: so many missions of each kind of building, and so many cut pairs of recorded maps."""
     simulated = [Job(kind, first) for first in range(0, missions, BLOCK) for kind in KINDS]
-    return [*simulated, *(Job("recorded", first) for first in range(0, cuts, _CUTS_A_JOB))]
+    return [*simulated, *(Job(RECORDED, first) for first in range(0, cuts, _CUTS_A_JOB))]
 
 
 def observed(job: Job) -> list[Observation]:
     """Match the pairs of a job."""
-    made = _recorded(job.first) if job.group == "recorded" else _simulated(job.group, job.first)
+    made = _recorded(job.first) if job.group == RECORDED else _simulated(job.group, job.first)
     rng = np.random.default_rng([job.first, 80])
     found = []
     for pair, held_out in made:
         is_bent = bool(rng.uniform() < BENT_SHARE)
-        item = _observation(bent(pair, rng) if is_bent else pair, job.group, held_out=held_out, is_bent=is_bent)
-        found += [item] if item else []
+        found.append(_observation(bent(pair, rng) if is_bent else pair, job, held_out=held_out, is_bent=is_bent))
     return found
 
 
@@ -157,19 +159,19 @@ def _simulated(kind: str, first: int) -> Iterator[tuple[Pair, bool]]:
             found = mission(kind, seed)
             related = list(pairs(found, _LEAST_OVERLAP))
             twins = [strangers(kind, twin, next_to) for twin in _twin_seeds(seed) for next_to in TWINS]
-        except ValueError:  # the robots of this seed meet nothing in common
+        except NoWay:  # a robot of this seed cannot go where it should
             continue
         missions.append(found)
         chosen = rng.permutation(len(related))[:PAIRS_A_MISSION].tolist()
         yield from ((related[index], held_out) for index in chosen)
         yield from ((pair, held_out) for pair in twins)
     for one, two in _crossed(missions, rng):
-        yield unrelated("crossed", kind, one, two), False
+        yield unrelated(CROSSED, kind, one, two), False
 
 
 def _twin_seeds(seed: int) -> Iterator[int]:
     """Yield seeds of other buildings, which no mission has."""
-    return (seed + (number + 1) * _SEEDS_OF_MISSIONS for number in range(TWINS_A_MISSION))
+    return (seed + (number + 1) * SEEDS_OF_MISSIONS for number in range(TWINS_A_MISSION))
 
 
 def _crossed(missions: Sequence[Mission], rng: np.random.Generator) -> Iterator[tuple[Grid, Grid]]:
@@ -189,27 +191,40 @@ def _recorded(first: int) -> Iterator[tuple[Pair, bool]]:
     yield from cut_strangers(first, _CUTS_A_JOB)
 
 
-def _observation(pair: Pair, group: str, *, held_out: bool, is_bent: bool) -> Observation | None:
+def _observation(pair: Pair, job: Job, *, held_out: bool, is_bent: bool) -> Observation:
     config = MergeConfig()
     matcher = load_matcher(config.method)
     grids = pair.target, pair.source
     resolution_m = max(config.search.working_cell_m, *(grid.resolution_m for grid in grids))
     target, source = (matcher.prepare(grid, resolution_m, config) for grid in grids)
     match = matcher.match(target, source, config)
-    if match.cues is None or match.target_from_source is None:
-        return None
-    weighed = [(match.target_from_source, match.cues.fit)]
+    weighed = [(match.target_from_source, match.cues.fit)] if match.cues and match.target_from_source else []
     weighed += [(rival.target_from_source, rival.fit) for rival in match.rivals if rival.fit is not None]
     candidates = tuple(
-        Candidate(
-            *(errors(pose, pair.truth, pair.centre_m) if pair.truth else (0.0, 0.0)),
-            wrap_angle(pose.yaw_rad - match.target_from_source.yaw_rad),
-            fit,
-        )
+        Candidate(*(errors(pose, pair.truth, pair.centre_m) if pair.truth else (0.0, 0.0)), fit)
         for pose, fit in weighed
     )
-    related = pair.truth is not None
-    return Observation(pair.name, group, held_out, related, pair.ambiguous, pair.overlap, is_bent, candidates)
+    return Observation(
+        name=pair.name,
+        group=job.group,
+        building=_building(pair.name, job),
+        held_out=held_out,
+        related=pair.truth is not None,
+        ambiguous=pair.ambiguous,
+        overlap=pair.overlap,
+        bent=is_bent or pair.bend_m >= _BENT_BY_DRIFT_M,
+        candidates=candidates,
+    )
+
+
+def _building(name: str, job: Job) -> str:
+    """Return what a pair has in common with others: the mission, with its twins; of several, the block; a building."""
+    if name.startswith(CROSSED):
+        return f"{job.group} from {job.first}"
+    if job.group == RECORDED:
+        return building(name)
+    kind, seed = name.split("-")[:2]
+    return f"{kind}-{int(seed.split()[0]) % SEEDS_OF_MISSIONS}"
 
 
 def errors(found: Sim2, truth: Sim2, at_m: tuple[float, float]) -> tuple[float, float]:

@@ -1,7 +1,8 @@
 """How long it takes to match two maps from nothing, against simpler work on them: ``python -m benchmarks.speed``.
 
-Two maps of about so many cells a side (`benchmarks.large`), each by one thread of one process, medians of some rounds
-in which the contestants take turns. Ratios say more than seconds, which differ from machine to machine.
+Two maps of about so many cells a side (`benchmarks.large`), medians of processor time of some rounds in which the
+contestants take turns in one process, with one thread of OpenCV. Ratios say more than seconds, which differ from
+machine to machine.
 """
 
 from __future__ import annotations
@@ -86,10 +87,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--sides", type=int, nargs="+", default=SIDES, help="cells a side")
     parser.add_argument("--rounds", type=int, default=5)
     options = parser.parse_args(arguments)
+    if options.rounds < 1:
+        parser.error(f"--rounds {options.rounds}: expected 1 or more")
+    threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
-    print(header())
-    for side in options.sides:
-        print(line(*large_pair(side), options.rounds), flush=True)
+    try:
+        print(header())
+        for side in options.sides:
+            print(line(*large_pair(side), options.rounds), flush=True)
+    finally:
+        cv2.setNumThreads(threads)
 
 
 if __name__ == "__main__":

@@ -115,8 +115,8 @@ class SearchConfig(Settings):
     clear_agreement: float = 0.9
     clear_wall_m: float = 10.0
     clear_likeness: float = 0.5
-    weighed: int = 6
-    worth_weighing: float = 0.2
+    weighed: int = 8
+    worth_weighing: float = 0.15
     working_cell_m: float = 0.05
 
     def __post_init__(self) -> None:
@@ -174,15 +174,15 @@ class SlackConfig(Settings):
         Largest shift.
     reject_m
         One step for each of these, beyond which walls are not drawn to each other.
-    stiffness
-        How much wall, in points, it takes to shift its surroundings by half of what it asks for.
+    stiffness_m
+        How much wall it takes to shift its surroundings, in each step, by half of what it asks for.
     """
 
     cell_m: float = 0.5
     length_m: float = 1.5
     most_m: float = 0.9
     reject_m: tuple[float, ...] = (0.9, 0.9, 0.7, 0.5, 0.4, 0.3)
-    stiffness: float = 30.0
+    stiffness_m: float = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,9 +209,8 @@ class VerifyConfig(Settings):
         Least share of the walls in the overlap that must agree, however sure a placement is otherwise.
     poor_agreement, rival_likelihood
         What is named as the reason where the confidence is too low: walls that disagree, if less than this share
-        of them agrees; else ambiguity, if a rival is more than so many times as likely.
-    clearly_worse
-        A placement within a prior is refused if its score is less than this share of what the maps reach elsewhere.
+        of them agrees; else ambiguity, if a rival is more than so many times as likely. A placement within a prior is
+        refused if it is less than so many times as likely as one elsewhere.
     min_confidence
         Least calibrated probability that the placement is right, where the method states one.
     witness_confidence, nearly_sure_confidence
@@ -234,7 +233,6 @@ class VerifyConfig(Settings):
     least_agreement: float = 0.7
     poor_agreement: float = 0.8
     rival_likelihood: float = 0.05
-    clearly_worse: float = 0.85
     min_confidence: float = 0.95
     witness_confidence: float = 0.8
     nearly_sure_confidence: float = 0.9
@@ -244,11 +242,8 @@ class VerifyConfig(Settings):
 
     def __post_init__(self) -> None:
         super(VerifyConfig, self).__post_init__()
-        if self.min_confidence > HIGHEST_CONFIDENCE:
-            raise ConfigError(
-                f"min_confidence is {self.min_confidence}; expected a probability, at most {HIGHEST_CONFIDENCE}, "
-                "for no placement is called surer than that"
-            )
+        if self.min_confidence > 1.0:
+            raise ConfigError(f"min_confidence is {self.min_confidence}; expected a probability, at most 1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,3 +281,18 @@ class MergeConfig(Settings):
         least, largest = self.scale_range
         if not least <= largest:
             raise ConfigError(f"scale_range is {self.scale_range}; expected the smaller factor first")
+        most = 1.0 - self.tries * (1.0 - HIGHEST_CONFIDENCE)
+        if self.verify.min_confidence > most + 1e-9:
+            limit = math.floor(most * 1e4 + 1e-6) / 1e4
+            raise ConfigError(
+                f"min_confidence is {self.verify.min_confidence}; expected at most {limit}, "
+                f"for with the scale {self.scale!r} no placement is called surer"
+            )
+
+    @property
+    def tries(self) -> float:
+        """Among how many independent searches a placement is the best: one, or one for each scale that differs."""
+        least, largest = self.scale_range
+        if self.scale == "metadata":
+            return 1.0
+        return 1.0 + math.log(largest / least) / self.search.distinct_scale

@@ -142,8 +142,10 @@ def agreed(
 
 def _may_witness(match: Match, limits: VerifyConfig) -> bool:
     """Tell whether a refused match has no rival, is nearly sure, and lacks nothing that every match must have."""
+    rival = max((rival.likelihood or 0.0 for rival in match.rivals), default=0.0)
     return (
         match.reason.code in _UNCONTESTED
+        and rival <= limits.rival_likelihood
         and (match.confidence or 0.0) >= limits.witness_confidence
         and match.scores is not None
         and match.scores.wall_agreement >= limits.least_agreement

@@ -219,30 +219,31 @@ def run_options(options: argparse.Namespace) -> RunOptions:
 def _placing_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return how maps are placed, as keywords of `RunOptions`."""
     from mapmerge.config import MergeConfig, VerifyConfig
+    from mapmerge.errors import ConfigError
     from mapmerge.match import MATCHERS
     from replay.init_pose import InitPose
 
     if options.method not in MATCHERS:
         raise UsageError(f"--method {options.method}: there is no such method; expected {', '.join(MATCHERS)}")
     verify = VerifyConfig(min_confidence=_probability(options.min_confidence))
+    try:
+        merge = MergeConfig(method=options.method, scale=options.scale, verify=verify)
+    except ConfigError as error:
+        raise UsageError(f"--min-confidence {options.min_confidence}: {error}") from error
     return {
         "init_poses": tuple(InitPose.parse(text) for text in options.init_pose),
         "use_tf": options.use_tf,
-        "merge": MergeConfig(method=options.method, scale=options.scale, verify=verify),
+        "merge": merge,
     }
 
 
 def _probability(text: str) -> float:
-    from mapmerge.config import HIGHEST_CONFIDENCE
-
     try:
         probability = float(text)
     except ValueError:
         probability = math.nan
     if not 0.0 < probability < 1.0:
         raise UsageError(f"--min-confidence {text}: expected a probability between 0 and 1, such as 0.99")
-    if probability > HIGHEST_CONFIDENCE:
-        raise UsageError(f"--min-confidence {text}: no placement is called surer than {HIGHEST_CONFIDENCE}")
     return probability
 
 

@@ -1,9 +1,9 @@
 """The probability that a placement is right, from what speaks for and against it.
 
 Two additive models, each a sum of piecewise linear curves that only rise, or only fall, as a cue says more for the
-placement, and that are flat beyond what was seen in fitting. The first one, `odds`, weighs placements by themselves:
-at most one of them is right, so that each takes its share of the likelihood (a conditional logit, with "nothing in
-common" as one more choice). The second one, `confidence`, is of how the likeliest one stands among the others.
+placement, and that are flat beyond their first and last knots. The first one, `log_odds_of`, weighs placements by
+themselves: at most one of them is right, so that each takes its share of the likelihood (a conditional logit, with
+"none of them" as one more choice). The second one, `confidence`, is of how the likeliest one stands among the others.
 `mapmerge.match.calibration` holds what ``python -m benchmarks.calibrate`` fitted; docs/method.md says on what, and how
 well it holds on other buildings.
 """
@@ -20,10 +20,10 @@ from mapmerge.match.calibration import CONFIDENCE, ODDS
 from mapmerge.match.cues import Contest, Fit, clearance
 
 UNRIVALLED = 20.0
-"""`Contest.lead_odds` where there is nothing else."""
+"""`Contest.lead_log_odds` where there is nothing else."""
 
 _MOST_LOG_ODDS = 50.0
-_LEAD_COUNTS = 2.0
+_TELLING = 2.0  # the fit's penalty understates how much likelier one placement is than another: ties alone shall be cut
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +78,8 @@ def additive(table: tuple[float, Mapping[str, tuple[tuple[float, ...], tuple[flo
 _ODDS, _CONFIDENCE = additive(ODDS), additive(CONFIDENCE)
 
 
-def odds(fit: Fit) -> float:
-    """Return the log odds that a placement is right, by itself, against that the maps have nothing in common."""
+def log_odds_of(fit: Fit) -> float:
+    """Return the log odds that a placement is right, by itself, against that none is."""
     return _ODDS.log_odds(fit)
 
 
@@ -91,7 +91,7 @@ def contest(fits: Sequence[Fit], log_odds: Sequence[float]) -> Contest:
     fits
         Of each, at least one.
     log_odds
-        `odds` of each.
+        `log_odds_of` each.
     """
     best, others = log_odds[0], log_odds[1:]
     most = max(0.0, *log_odds)
@@ -100,11 +100,12 @@ def contest(fits: Sequence[Fit], log_odds: Sequence[float]) -> Contest:
     score_m = fits[0].score_m
     lead_m = max(0.0, score_m - max(0.0, rival_m))
     return Contest(
-        odds=best,
-        lead_odds=min(UNRIVALLED, best - max(others)) if others else UNRIVALLED,
+        log_odds=best,
+        lead_log_odds=min(UNRIVALLED, best - max(others)) if others else UNRIVALLED,
         share=math.exp(best - most) / total,
         likeness=min(1.0, max(0.0, rival_m) / score_m) if score_m > 0.0 else 1.0,
         lead_m=lead_m,
+        crowd=1.0 + sum(math.exp(min(_MOST_LOG_ODDS, _TELLING * (value - best))) for value in others),
         clearance=clearance(lead_m, fits[0].contradicted_m),
     )
 
@@ -112,7 +113,7 @@ def contest(fits: Sequence[Fit], log_odds: Sequence[float]) -> Contest:
 def confidence(standing: Contest, tries: float = 1.0) -> float:
     """Return the calibrated probability that the likeliest placement, which stands like this among others, is right.
 
-    Of two placements that are as likely only one is right, whatever else is said of them.
+    Of some placements that are about as likely only one is right, whatever else is said of them.
 
     Parameters
     ----------
@@ -121,13 +122,18 @@ def confidence(standing: Contest, tries: float = 1.0) -> float:
     tries
         It is the best of so many independent searches, each of which might have found a wrong one.
     """
-    stated = stated_confidence(_CONFIDENCE.log_odds(standing), standing.lead_odds)
+    stated = stated_confidence(_CONFIDENCE.log_odds(standing), standing.crowd)
     return max(0.0, 1.0 - tries * (1.0 - stated))
 
 
-def stated_confidence(log_odds: float, lead_odds: float) -> float:
-    """Return the probability of log odds, capped where another placement is about as likely."""
-    return min(HIGHEST_CONFIDENCE, logistic(log_odds), logistic(_LEAD_COUNTS * lead_odds))
+def stated_confidence(log_odds: float, crowd: float) -> float:
+    """Return the probability of log odds, at most one in so many as the choice is among."""
+    return min(HIGHEST_CONFIDENCE, logistic(log_odds), 1.0 / crowd)
+
+
+def times_as_likely(log_odds: float) -> float:
+    """Return how many times as likely one placement is as another, from the difference of their log odds."""
+    return math.exp(min(max(log_odds, -_MOST_LOG_ODDS), _MOST_LOG_ODDS))
 
 
 def logistic(log_odds: float) -> float:

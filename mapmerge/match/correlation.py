@@ -25,13 +25,13 @@ from mapmerge.evidence import Curve, CurvesEvidence, Evidence, OverlayEvidence, 
 from mapmerge.grid import Grid
 from mapmerge.match.base import Match, Rival
 from mapmerge.match.candidates import all_scales, by_half_turn, by_prior, by_spectra, by_sweep, likely_rotations
-from mapmerge.match.confidence import confidence
-from mapmerge.match.cues import Cues
+from mapmerge.match.confidence import confidence, times_as_likely
+from mapmerge.match.cues import Cues, Fit
 from mapmerge.match.look import Look, beside, look, rivals
 from mapmerge.match.pair import DescribedMap, PairOfMaps
 from mapmerge.match.spectrum import orientation_spectra, spectrum_correlation
 from mapmerge.match.surface import TranslationSearch
-from mapmerge.match.verdict import contradicted, judge, too_little_structure, within
+from mapmerge.match.verdict import contradicted, is_far_likelier, judge, too_little_structure, within
 from mapmerge.match.weigh import Weighed, weighed
 from mapmerge.polish import polish
 from mapmerge.prepare import prepare
@@ -39,6 +39,8 @@ from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
 from mapmerge.verify import verify
+
+_ROUNDS = 4
 
 
 class CorrelationMatcher:
@@ -67,14 +69,13 @@ class CorrelationMatcher:
 
 
 def _held_against(match: Match, elsewhere: Match, pair: PairOfMaps, config: MergeConfig) -> Match:
-    """Return the match within a prior, refused if the maps clearly fit elsewhere."""
-    if pair.prior is None or elsewhere.scores is None or elsewhere.target_from_source is None:
+    """Return the match within a prior, refused if the maps fit elsewhere and not there, or are far likelier there."""
+    if pair.prior is None or elsewhere.target_from_source is None:
         return match
     found = poses_of([pair.between_grids(elsewhere.target_from_source)])
     if not pair.allowed(found).all():
-        mine_m = match.scores.score_m if match.scores else 0.0
-        is_better = match.accepted and elsewhere.scores.score_m * config.verify.clearly_worse > mine_m
-        if is_better or (elsewhere.accepted and not match.accepted):
+        is_likelier = match.accepted and is_far_likelier(elsewhere, match, config.verify)
+        if is_likelier or (elsewhere.accepted and not match.accepted):
             return contradicted(match, elsewhere, pair.prior, pair, config.verify)
     return match if match.accepted else within(match, pair.prior)
 
@@ -90,7 +91,7 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
     best = _polished(pair, placement_of(found.look.poses[0]), config)
     scores = verify(pair.target.map, pair.source.map, best, config.verify)
     cues = Cues(found.fits[0], found.contest)
-    sure = confidence(cues.contest, _tries(config))
+    sure = confidence(cues.contest, config.tries)
     reason = judge(scores, cues, sure, config.verify)
     return Match(
         target_from_source=pair.between_maps(best),
@@ -102,7 +103,7 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
         rivals=_rivals(pair, found),
         evidence=(
             _spectra(pair, rotations),
-            _surface(pair, best, ranked, config),
+            _surface(pair, best, found.look, config),
             _overlay(pair, best, config),
         ),
     )
@@ -111,17 +112,10 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
 def _rivals(pair: PairOfMaps, found: Weighed) -> tuple[Rival, ...]:
     """Return the placements that compete with the first one."""
     best, *others = found.log_odds
-    rows = zip(found.look.poses[1:], found.look.scores_m[1:].tolist(), others, found.fits[1:], strict=True)
     return tuple(
-        Rival(pair.between_maps(placement_of(pose)), score_m, math.exp(min(0.0, log_odds - best)), fit)
-        for pose, score_m, log_odds, fit in rows
+        Rival(pair.between_maps(placement_of(pose)), fit.score_m, times_as_likely(log_odds - best), fit)
+        for pose, log_odds, fit in zip(found.look.poses[1:], others, found.fits[1:], strict=True)
     )
-
-
-def _tries(config: MergeConfig) -> float:
-    """Return among how many independent searches a placement is the best: one, or one for each scale that differs."""
-    least, largest = config.scale_range
-    return 1.0 if config.scale == "metadata" else 1.0 + math.log(largest / least) / config.search.distinct_scale
 
 
 def _search(pair: PairOfMaps, rotations: tuple[float, ...], config: MergeConfig) -> Look:
@@ -169,13 +163,17 @@ def _apart(pair: PairOfMaps, seen: Look, config: MergeConfig) -> Look:
 
 
 def _weighed(pair: PairOfMaps, ranked: Look, config: MergeConfig) -> Weighed:
-    """Return the ranked placements, likeliest first, with what competes with that one."""
-    found = weighed(pair, ranked, config)
-    likeliest = found.look.poses[:1]
-    if np.array_equal(likeliest, ranked.poses[:1]):
-        return found
-    around = _around(pair, likeliest, _scales(pair, config)[0], config)
-    return weighed(pair, _apart(pair, ranked.joined(around), config), config)
+    """Return the ranked placements, likeliest first, once what competes with the likeliest was looked for as well."""
+    known: dict[bytes, Fit] = {}
+    looked_at = [ranked.poses[:1]]
+    found = weighed(pair, ranked, config, known)
+    while len(looked_at) < _ROUNDS and not any(np.array_equal(found.look.poses[:1], pose) for pose in looked_at):
+        likeliest = found.look.poses[:1]
+        looked_at.append(likeliest)
+        around = _around(pair, likeliest, _scales(pair, config)[0], config)
+        ranked = _apart(pair, ranked.joined(around), config)
+        found = weighed(pair, ranked, config, known)
+    return found
 
 
 def _polished(pair: PairOfMaps, rough: Sim2, config: MergeConfig) -> Sim2:
@@ -236,7 +234,7 @@ def _spectra(pair: PairOfMaps, rotations: tuple[float, ...]) -> CurvesEvidence:
     )
 
 
-def _surface(pair: PairOfMaps, best: Sim2, ranked: Look, config: MergeConfig) -> Evidence:
+def _surface(pair: PairOfMaps, best: Sim2, weighed_ones: Look, config: MergeConfig) -> Evidence:
     """Return the surface at the rotation of the best placement, with all placements of about this rotation."""
     search = config.search
     turn = Sim2(0.0, 0.0, best.yaw_rad, best.scale)
@@ -249,7 +247,7 @@ def _surface(pair: PairOfMaps, best: Sim2, ranked: Look, config: MergeConfig) ->
         max(1.0, turn.scale),
     )
     surface = translations.surfaces(turn)[0]
-    others = ranked.poses
+    others = weighed_ones.poses[1:]
     same_turn = np.abs(np.remainder(others[:, 2] - turn.yaw_rad + np.pi, 2 * np.pi) - np.pi) < 0.1
     return SurfaceEvidence(
         step="correlation_surface",

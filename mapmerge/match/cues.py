@@ -16,7 +16,7 @@ from mapmerge.score import far_share
 from mapmerge.sim2 import Sim2
 from mapmerge.verify import verified
 
-_LEAST_SHARE = 0.05
+_HOLDS = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +28,11 @@ class Fit:
     Parameters
     ----------
     score_m
-        What candidates are ranked by at first, see `VerifyConfig.violation_weight`; counts in contests alone.
+        What candidates are ranked by at first, see `VerifyConfig.violation_weight`.
     contradicted_m
-        Length of the walls that contradict the placement even if the maps may bend; counts in contests alone.
+        Length of the walls that contradict the placement even if the maps may bend, mean of both directions.
+    wall_agreement
+        Share of the walls that agree, in the worse direction. This and the two above are no cues by themselves.
     matched_wall_m
         Length of the walls that agree, mean of both directions.
     slack_agreement
@@ -53,6 +55,7 @@ class Fit:
 
     score_m: float
     contradicted_m: float
+    wall_agreement: float
     matched_wall_m: float
     slack_agreement: float
     far_share: float
@@ -71,25 +74,28 @@ class Contest:
 
     Parameters
     ----------
-    odds
-        Logarithm of how many times likelier it is, by itself, than that the maps have nothing in common.
-    lead_odds
+    log_odds
+        Logarithm of how many times likelier it is, by itself, than that none is right.
+    lead_log_odds
         Logarithm of how many times likelier it is than the best of the others.
     share
-        Its share of the likelihood of all of them and of nothing in common, 0 to 1.
+        Its share of the likelihood of all of them and of that none is right, 0 to 1.
     likeness
         Largest score of the others over its own, 0 to 1.
     lead_m
         Its score less the largest of the others.
+    crowd
+        Among how many placements that are about as likely the choice is; 1 if it is clear.
     clearance
         Logarithm of the lead over the wall that contradicts it even if the maps may bend, 1 m added to each.
     """
 
-    odds: float
-    lead_odds: float
+    log_odds: float
+    lead_log_odds: float
     share: float
     likeness: float
     lead_m: float
+    crowd: float
     clearance: float
 
 
@@ -107,15 +113,15 @@ def fit_of(pair: PairOfMaps, target_from_source: Sim2, config: MergeConfig) -> F
     scores, found = verified(target, source, target_from_source, config.verify)
     aligned, held_m = _direction(target, source, poses_of([target_from_source]), config.verify)
     bent = slack(target, source, target_from_source, config.slack)
-    contradicted_m = scores.matched_wall_m * (1.0 / max(bent.share, _LEAST_SHARE) - 1.0)
     return Fit(
         score_m=scores.score_m,
-        contradicted_m=contradicted_m,
+        contradicted_m=bent.contradicted_m,
+        wall_agreement=scores.wall_agreement,
         matched_wall_m=scores.matched_wall_m,
         slack_agreement=bent.share,
         far_share=far_share(found.ahead, found.back),
         slack_far_share=bent.far_share,
-        solidity=_log_ratio(scores.score_m, contradicted_m),
+        solidity=_log_ratio(scores.score_m, bent.contradicted_m),
         acceptance=scores.acceptance,
         overlap_m2=scores.overlap_m2,
         overlap_fraction=scores.overlap_fraction,
@@ -146,7 +152,9 @@ def _direction(target: PreparedMap, source: PreparedMap, pose: Poses, config: Ve
     here = source.directions[met] @ np.array([[cos, sin], [-sin, cos]])
     strength = np.hypot(*there.T) * np.hypot(*here.T)
     total = float(strength.sum())
-    # walls hold across their length: the smaller eigenvalue of the sum of the normals' outer products
-    lean = float(np.hypot(*(there * strength[:, None]).sum(axis=0)))
-    held_m = max(0.0, (total - lean) / 2) * source.wall_spacing_m * float(pose[0, 3])
+    # directions are of twice the angle: along the weakest axis only walls hold that run well across most of them
+    main = (there * strength[:, None]).sum(axis=0)
+    main /= max(float(np.hypot(*main)), 1e-9)
+    across = 0.5 * (1.0 - there @ main / np.maximum(np.hypot(*there.T), 1e-9))
+    held_m = float((strength * across)[across > _HOLDS].sum()) * source.wall_spacing_m * float(pose[0, 3])
     return float((there * here).sum() / max(total, 1e-9)), held_m

@@ -36,19 +36,16 @@ class Look:
         Length of the walls that agree, mean of both directions, shape (C,).
     shares
         Share of the walls that agree, in the worse of both directions, shape (C,).
-    free_m2
-        Free space that agrees, shape (C,).
     """
 
     poses: Poses
     scores_m: NDArray[np.float64]
     matched_m: NDArray[np.float64]
     shares: NDArray[np.float64]
-    free_m2: NDArray[np.float64]
 
     def rows(self, chosen: Sequence[int] | slice) -> Look:
         """Return some of the placements."""
-        parts = (self.poses, self.scores_m, self.matched_m, self.shares, self.free_m2)
+        parts = (self.poses, self.scores_m, self.matched_m, self.shares)
         return Look(*(part[chosen] for part in parts))
 
     def followed_by(self, other: Look) -> Look:
@@ -58,7 +55,6 @@ class Look:
             np.concatenate([self.scores_m, other.scores_m]),
             np.concatenate([self.matched_m, other.matched_m]),
             np.concatenate([self.shares, other.shares]),
-            np.concatenate([self.free_m2, other.free_m2]),
         )
 
     def joined(self, other: Look) -> Look:
@@ -123,7 +119,7 @@ def scored(pair: PairOfMaps, poses: Poses, config: MergeConfig) -> Look:
     found = agreement(target, source, poses, probe(source, most, most // 2), probe(target, most, most // 2))
     matched_m = (found.ahead.matched_m + found.back.matched_m) / 2
     shares = np.minimum(found.ahead.share, found.back.share)
-    judged = Look(poses, found.score_m(config.verify), matched_m, shares, found.free_m2)
+    judged = Look(poses, found.score_m(config.verify), matched_m, shares)
     return judged.rows(np.argsort(-judged.scores_m, kind="stable").tolist())
 
 

@@ -41,6 +41,11 @@ class Slack:
         return float(min(self.ahead.share[0], self.back.share[0]))
 
     @property
+    def contradicted_m(self) -> float:
+        """Length of the walls in the other map's free space, mean of both directions."""
+        return float(self.ahead.violated_m[0] + self.back.violated_m[0]) / 2
+
+    @property
     def far_share(self) -> float:
         """Share of the walls that stand amid the other map's free space, far from its walls."""
         return far_share(self.ahead, self.back)
@@ -70,7 +75,7 @@ def slack(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, co
     """Return how well two maps agree at a placement between their grid frames if both may bend a little."""
     pose = poses_of([target_from_source])
     x, y = (values[0] for values in placed(pose, source.walls_m))
-    field = _bent(target, x, y, config)
+    field = _bent(target, x, y, source.wall_spacing_m * target_from_source.scale, config)
     shift_x, shift_y = field.at(x, y)
     ahead = tally(met_at(target, x + shift_x, y + shift_y), source.wall_spacing_m * target_from_source.scale)
     wall_x, wall_y = target.walls_m.astype(np.float32).T
@@ -81,8 +86,8 @@ def slack(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, co
     return Slack(ahead, back)
 
 
-def _bent(target: PreparedMap, x: Floats, y: Floats, config: SlackConfig) -> _Field:
-    """Return the smooth field of shifts that brings walls at these places on the target's."""
+def _bent(target: PreparedMap, x: Floats, y: Floats, spacing_m: float, config: SlackConfig) -> _Field:
+    """Return the smooth field of shifts that brings walls at these places, each so long, on the target's."""
     corner = float(x.min()), float(y.min())
     cols = int((float(x.max()) - corner[0]) / config.cell_m) + 1
     rows = int((float(y.max()) - corner[1]) / config.cell_m) + 1
@@ -96,7 +101,7 @@ def _bent(target: PreparedMap, x: Floats, y: Floats, config: SlackConfig) -> _Fi
         wall = target.nearest.wall_at(at_x, at_y)
         error_x, error_y = walls[wall, 0] - at_x, walls[wall, 1] - at_y
         square = np.square(error_x) + np.square(error_y)
-        weight = np.where(square <= reach_m**2, 1.0 / (1.0 + square / (0.35 * reach_m) ** 2), 0.0)
+        weight = np.where(square <= reach_m**2, spacing_m / (1.0 + square / (0.35 * reach_m) ** 2), 0.0)
         # of a straight wall only the shift across it is known: n nᵀ for its normal n
         cos, sin = target.directions[wall].T
         xx, xy, yy = 0.5 * weight * (1.0 - cos), -0.5 * weight * sin, 0.5 * weight * (1.0 + cos)
@@ -104,7 +109,7 @@ def _bent(target: PreparedMap, x: Floats, y: Floats, config: SlackConfig) -> _Fi
             _spread(np.bincount(index, values, rows * cols).reshape(rows, cols).astype(np.float32), config)
             for values in (xx, xy, yy, xx * error_x + xy * error_y, xy * error_x + yy * error_y)
         ]
-        step_x, step_y = _solved(sums, config.stiffness)
+        step_x, step_y = _solved(sums, config.stiffness_m)
         field = _limited(field, step_x, step_y, config.most_m)
     return field
 
@@ -116,10 +121,10 @@ def _spread(values: Floats, config: SlackConfig) -> Floats:
     return np.asarray(blurred * np.float32(2 * np.pi * sigma**2), np.float32)
 
 
-def _solved(sums: list[Floats], stiffness: float) -> tuple[Floats, Floats]:
-    """Solve the normal equations of each square, with a spring that draws it to no shift."""
+def _solved(sums: list[Floats], stiffness_m: float) -> tuple[Floats, Floats]:
+    """Solve the normal equations of each square for one step, damped where there is little wall."""
     xx, xy, yy, right_x, right_y = sums
-    xx, yy = xx + np.float32(stiffness), yy + np.float32(stiffness)
+    xx, yy = xx + np.float32(stiffness_m), yy + np.float32(stiffness_m)
     determinant = xx * yy - xy * xy
     step_x, step_y = (yy * right_x - xy * right_y) / determinant, (xx * right_y - xy * right_x) / determinant
     return step_x.astype(np.float32), step_y.astype(np.float32)

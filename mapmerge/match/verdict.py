@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from mapmerge.config import VerifyConfig
 from mapmerge.match.base import Match, Rival
+from mapmerge.match.confidence import times_as_likely
 from mapmerge.match.cues import Cues
 from mapmerge.match.pair import DescribedMap, PairOfMaps
 from mapmerge.prior import Prior
@@ -39,7 +40,7 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig) -
         floor = f"less than {config.least_agreement:.0%}"
         message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree, {floor}"
         return Reason(ReasonCode.WALLS_DISAGREE, message)
-    rival = math.exp(min(0.0, -cues.contest.lead_odds))
+    rival = times_as_likely(-cues.contest.lead_log_odds)
     if confidence >= config.min_confidence:
         message = (
             f"{scores.overlap_m2:.0f} m² overlap, walls agree {scores.wall_agreement:.2f}, "
@@ -57,6 +58,19 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig) -
         f"{_down(scores.wall_agreement, 2):.0%} of it, are not enough; {doubt}"
     )
     return Reason(ReasonCode.LOW_CONFIDENCE, message)
+
+
+def is_far_likelier(one: Match, other: Match, config: VerifyConfig) -> bool:
+    """Tell whether a placement that shares and agrees enough leaves another one no chance, see `rival_likelihood`."""
+    if one.cues is None or other.cues is None or one.scores is None:
+        return False
+    is_enough = (
+        one.scores.overlap_m2 >= config.min_overlap_m2
+        and one.scores.matched_wall_m >= config.min_matched_wall_m
+        and one.scores.wall_agreement >= config.least_agreement
+    )
+    difference = other.cues.contest.log_odds - one.cues.contest.log_odds
+    return is_enough and times_as_likely(difference) < config.rival_likelihood
 
 
 def within(match: Match, prior: Prior) -> Match:
@@ -81,13 +95,28 @@ def contradicted(match: Match, elsewhere: Match, prior: Prior, pair: PairOfMaps,
     return replace(
         match,
         reason=Reason(ReasonCode.PRIOR_CONTRADICTED, message),
-        rivals=(Rival(elsewhere.target_from_source, elsewhere.scores.score_m), *match.rivals),
+        rivals=(_as_rival(elsewhere, match), *match.rivals),
     )
 
 
+def _as_rival(elsewhere: Match, match: Match) -> Rival:
+    """Return a placement that was found elsewhere as a rival of a match; both must have a placement."""
+    pose, scores = elsewhere.target_from_source, elsewhere.scores
+    if pose is None or scores is None:
+        raise ValueError("a match without a placement is no rival")
+    if elsewhere.cues is None or match.cues is None:
+        return Rival(pose, scores.score_m)
+    difference = elsewhere.cues.contest.log_odds - match.cues.contest.log_odds
+    return Rival(pose, scores.score_m, times_as_likely(difference), elsewhere.cues.fit)
+
+
 def _times(likelihood: float) -> str:
-    """Return how many times as likely something is, 0 to 1, with as many digits as tell it from 0."""
-    return "less than 0.001" if likelihood < 0.001 else f"{likelihood:.{2 if likelihood >= 0.1 else 3}f}"
+    """Return how many times as likely something is, with as many digits as tell it from 0."""
+    if likelihood < 0.001:
+        return "less than 0.001"
+    if likelihood >= 1000.0:
+        return "more than 1000"
+    return f"{likelihood:.{3 if likelihood < 0.1 else 2 if likelihood < 10.0 else 0}f}"
 
 
 def _percent(share: float) -> str:

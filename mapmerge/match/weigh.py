@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mapmerge.align import placement_of
 from mapmerge.config import MergeConfig, VerifyConfig
-from mapmerge.match.confidence import contest, odds
+from mapmerge.match.confidence import contest, log_odds_of
 from mapmerge.match.cues import Contest, Fit, fit_of
 from mapmerge.match.look import Look
 from mapmerge.match.pair import PairOfMaps
@@ -17,7 +18,7 @@ from mapmerge.match.pair import PairOfMaps
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Weighed:
-    """Distinct placements between the grid frames, the likeliest first.
+    """Distinct placements between the grid frames, the likeliest first; those that share too little come last.
 
     Parameters
     ----------
@@ -26,7 +27,7 @@ class Weighed:
     fits
         How well the maps fit at each.
     log_odds
-        See `mapmerge.match.confidence.odds`.
+        See `mapmerge.match.confidence.log_odds_of`.
     """
 
     look: Look
@@ -39,7 +40,7 @@ class Weighed:
         return contest(self.fits, self.log_odds)
 
 
-def weighed(pair: PairOfMaps, ranked: Look, config: MergeConfig) -> Weighed:
+def weighed(pair: PairOfMaps, ranked: Look, config: MergeConfig, known: dict[bytes, Fit] | None = None) -> Weighed:
     """Return the best of some distinct placements, likeliest first.
 
     A score in metres prefers the placement that lets two maps overlap most; the likeliest one may share less ground,
@@ -54,21 +55,31 @@ def weighed(pair: PairOfMaps, ranked: Look, config: MergeConfig) -> Weighed:
         Placements, the largest score first.
     config
         Settings.
+    known
+        Fits of placements that were weighed before, by the bytes of their poses; those of others are added.
     """
     limits = config.search
     worth = ranked.scores_m >= limits.worth_weighing * max(0.0, float(ranked.scores_m[0]))
     rows = np.flatnonzero(worth)[: limits.weighed].tolist()
     chosen = ranked.rows(rows or [0])
-    fits = [fit_of(pair, placement_of(pose), config) for pose in chosen.poses]
-    log_odds = [odds(fit) for fit in fits]
+    fits = [_fit_of(pair, pose, config, {} if known is None else known) for pose in chosen.poses]
+    log_odds = [log_odds_of(fit) for fit in fits]
     order = likeliest_first(fits, log_odds, config.verify)
     return Weighed(chosen.rows(order), tuple(fits[row] for row in order), tuple(log_odds[row] for row in order))
 
 
+def _fit_of(pair: PairOfMaps, pose: NDArray[np.float64], config: MergeConfig, known: dict[bytes, Fit]) -> Fit:
+    key = pose.tobytes()
+    if key not in known:
+        known[key] = fit_of(pair, placement_of(pose), config)
+    return known[key]
+
+
 def likeliest_first(fits: Sequence[Fit], log_odds: Sequence[float], config: VerifyConfig) -> list[int]:
     """Return the order of placements: by their odds, but last those that share less than an accepted one must."""
+    return sorted(range(len(fits)), key=lambda row: (shares_too_little(fits[row], config), -log_odds[row]))
 
-    def is_poor(fit: Fit) -> bool:
-        return fit.overlap_m2 < config.min_overlap_m2 or fit.matched_wall_m < config.min_matched_wall_m
 
-    return sorted(range(len(fits)), key=lambda row: (is_poor(fits[row]), -log_odds[row]))
+def shares_too_little(fit: Fit, config: VerifyConfig) -> bool:
+    """Tell whether the maps share less at a placement than they do at one that is accepted."""
+    return fit.overlap_m2 < config.min_overlap_m2 or fit.matched_wall_m < config.min_matched_wall_m

@@ -8,17 +8,31 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy.optimize
+from scipy.optimize import check_grad
 
 from benchmarks import observations
 from benchmarks.bends import MOST_M, bent, random_bend
-from benchmarks.calibrate import by_group, source_of, stated, statement
-from benchmarks.fitting import AGAINST, KNOTS, Model, Models, balanced, fit_array, fitted, fitted_odds
+from benchmarks.calibrate import Stated, by_group, recall, source_of, stated, statement
+from benchmarks.fitting import (
+    AGAINST,
+    FOLDS,
+    KNOTS,
+    Model,
+    Models,
+    balanced,
+    fit_array,
+    fitted,
+    fitted_confidence,
+    fitted_odds,
+    folds,
+)
 from benchmarks.fitting import CONTEST as CONTEST_CUES
 from benchmarks.fitting import FIT as FIT_CUES
 from benchmarks.observations import BLOCK, Candidate, Job, Observation, errors, groups, jobs, observed, read
 from mapmerge.config import VerifyConfig
 from mapmerge.match import calibration
-from mapmerge.match.confidence import additive, confidence, contest, odds
+from mapmerge.match.confidence import additive, confidence, contest, log_odds_of
 from mapmerge.match.weigh import likeliest_first
 from mapmerge.sim2 import Sim2
 from samples.kinds import KINDS
@@ -26,16 +40,8 @@ from samples.pairs import Pair
 from tests.cues import FIT
 from tests.floors import WALL, flat, walled_room
 
-SEEN = Observation(
-    "a pair",
-    "recorded",
-    False,
-    True,
-    False,
-    0.4,
-    False,
-    (Candidate(0.1, 0.01, 0.0, FIT), Candidate(9.0, 3.0, 3.1, FIT)),
-)
+WEIGHED = Candidate(0.1, 0.01, FIT), Candidate(9.0, 3.0, FIT)
+SEEN = Observation("a pair", "recorded", "intel", False, True, False, 0.4, False, WEIGHED)
 
 
 def off(item, **changes):
@@ -60,8 +66,15 @@ class TestObservation:
         errors_of = {key: value for key, value in change.items() if key.startswith("error")}
         others = {key: value for key, value in change.items() if key not in errors_of}
         found = replace(off(SEEN, **errors_of), **others)
-        assert found.right is right
-        assert not found.is_right(found.candidates[1])
+        assert found.right_one == (0 if right else None)
+
+    def test_of_two_that_are_near_the_nearer_one_is_right(self):
+        """At most one placement is."""
+        near, nearer = replace(WEIGHED[0], error_m=0.8), replace(WEIGHED[0], error_m=0.6)
+        assert replace(SEEN, bent=True, candidates=(near, nearer)).right_one == 1
+
+    def test_without_a_placement_none_is(self):
+        assert replace(SEEN, candidates=()).right_one is None
 
     def test_is_read_as_it_was_written(self, tmp_path):
         path = tmp_path / "seen.jsonl"
@@ -102,10 +115,11 @@ class TestJobs:
             "office-2007-next wing",
         ]
         assert len(found) == 5 * BLOCK + 3
-        assert all(item.candidates[0].turn_rad == 0.0 for item in found)
-        assert all(
-            item.right == item.related == item.name.startswith("office-") & ("next" not in item.name) for item in found
-        )
+        assert {item.building for item in found if item.held_out} == {"office-7"}
+        assert {item.building for item in found if item.name == "crossed"} == {f"office from {BLOCK}"}
+        for item in found:
+            assert item.related == (item.name.startswith("office-") and "next" not in item.name)
+            assert item.right_one == (0 if item.related else None)
         assert not any(item.bent for item in found)
         crossed = [item for item in found if item.name.startswith("crossed")]
         assert [item.held_out for item in crossed] == [False] * 3
@@ -166,15 +180,21 @@ def odds_of(fit):
 @pytest.fixture(scope="module")
 def seen():
     """Observations of two or three candidates, one of which is right, or none, as their odds would have it."""
-    rng = np.random.default_rng(3)
+    return drawn(3000, seed=3)
+
+
+def drawn(count, seed):
+    rng = np.random.default_rng(seed)
     found = []
-    for number in range(3000):
+    for number in range(count):
         fits = [drawn_fit(rng) for _ in range(2 + number % 2)]
         chances = np.exp([0.0, *map(odds_of, fits)])
         right = int(rng.choice(len(chances), p=chances / chances.sum())) - 1
-        candidates = tuple(Candidate(0.0 if row == right else 9.0, 0.0, 0.0, fit) for row, fit in enumerate(fits))
+        candidates = tuple(Candidate(0.0 if row == right else 9.0, 0.0, fit) for row, fit in enumerate(fits))
         group = "recorded" if number % 3 else "office"
-        found.append(Observation(f"pair {number}", group, False, True, False, 0.5, False, candidates))
+        found.append(
+            Observation(f"pair {number}", group, f"{group}-{number % 60}", False, True, False, 0.5, False, candidates)
+        )
     return found
 
 
@@ -192,12 +212,48 @@ class TestFit:
         gap = models.odds.log_odds(values)[there] - known
         assert np.abs(gap).mean() < 0.35
 
-    def test_is_calibrated(self, seen, models):
-        sure, right = stated(seen, models)
+    def test_is_calibrated_on_others(self, models):
+        said = stated(drawn(3000, seed=4), models)
         for low, high in ((0.0, 0.5), (0.5, 0.8), (0.8, 1.0)):
-            within = (sure >= low) & (sure < high)
+            within = (said.sure >= low) & (said.sure < high)
             assert within.sum() > 100
-            assert right[within].mean() == pytest.approx(sure[within].mean(), abs=0.04)
+            assert said.right[within].mean() == pytest.approx(said.sure[within].mean(), abs=0.05)
+
+    def test_slopes_are_those_of_the_losses(self, seen, monkeypatch):
+        """Of both models, at a point away from the end of the search."""
+        losses = []
+        monkeypatch.setattr("benchmarks.fitting._minimised", lambda loss, cues: losses.append((loss, cues)))
+        values, there, right = fit_array(seen[:60])
+        fitted_odds(values, there, right, np.ones(60))
+        rng = np.random.default_rng(1)
+        fitted_confidence(rng.uniform(0.0, 3.0, (60, len(CONTEST_CUES))), right[:, 0], np.ones(60))
+        for loss, cues in losses:
+            size = sum(len(KNOTS[cue]) - 1 for cue in cues)
+            point = np.append(rng.uniform(0.0, 1.0, size), -1.0)
+            assert check_grad(lambda at, f=loss: f(at)[0], lambda at, f=loss: f(at)[1], point) < 1e-5
+
+    def test_ends_at_the_same_wherever_it_begins(self, seen, monkeypatch):
+        values, there, right = fit_array(seen[:500])
+        here = fitted_odds(values, there, right, np.ones(500))
+        begin = scipy.optimize.minimize
+        monkeypatch.setattr("benchmarks.fitting.minimize", lambda loss, start, **how: begin(loss, start + 0.4, **how))
+        there_too = fitted_odds(values, there, right, np.ones(500))
+        assert np.abs(here.log_odds(values) - there_too.log_odds(values))[there].max() < 0.01
+
+    def test_says_so_if_it_does_not_end(self, seen, monkeypatch):
+        begin = scipy.optimize.minimize
+        monkeypatch.setattr(
+            "benchmarks.fitting.minimize",
+            lambda loss, start, **how: begin(loss, start, **{**how, "options": {"maxiter": 1}}),
+        )
+        with pytest.raises(RuntimeError, match="did not converge"):
+            fitted(seen[:200])
+
+    def test_no_building_is_in_two_parts(self, seen):
+        parts = folds(seen)
+        assert set(parts.tolist()) == set(range(FOLDS))
+        for name in {item.building for item in seen}:
+            assert len({part for part, item in zip(parts.tolist(), seen, strict=True) if item.building == name}) == 1
 
     def test_what_does_not_matter_adds_little(self, models):
         totals = {name: abs(rises.sum()) for name, rises in zip(FIT_CUES, models.odds.rises, strict=True)}
@@ -218,13 +274,31 @@ class TestFit:
         exec(source_of(models), read_back)  # noqa: S102
         monkeypatch.setattr("mapmerge.match.confidence._ODDS", additive(read_back["ODDS"]))
         monkeypatch.setattr("mapmerge.match.confidence._CONFIDENCE", additive(read_back["CONFIDENCE"]))
-        sure, _ = stated(seen[:50], models)
-        for item, mine in zip(seen, sure.tolist(), strict=False):
+        said = stated(seen[:50], models)
+        for item, mine in zip(seen, said.sure.tolist(), strict=False):
             fits = [candidate.fit for candidate in item.candidates]
-            log_odds = [odds(fit) for fit in fits]
+            log_odds = [log_odds_of(fit) for fit in fits]
             order = likeliest_first(fits, log_odds, VerifyConfig())
             standing = contest([fits[row] for row in order], [log_odds[row] for row in order])
-            assert confidence(standing) == pytest.approx(mine, abs=2e-3)
+            is_enough = fits[order[0]].overlap_m2 >= VerifyConfig().min_overlap_m2
+            assert mine == pytest.approx(confidence(standing) if is_enough else 0.0, abs=2e-3)
+
+
+class TestStated:
+    @pytest.mark.parametrize("change", [{"overlap_m2": 5.9}, {"matched_wall_m": 7.9}, {"wall_agreement": 0.69}])
+    def test_what_is_never_accepted_is_not_counted_as_accepted(self, models, change):
+        poor = replace(FIT, **change)
+        found = replace(SEEN, candidates=(Candidate(0.0, 0.0, poor),))
+        assert stated([SEEN], models).sure[0] > 0.0
+        assert stated([found], models).sure[0] == 0.0
+
+    def test_a_pair_without_a_placement_counts_as_missed(self, models):
+        said = stated([SEEN, replace(SEEN, candidates=())], models)
+        assert (said.sure[1], said.right[1]) == (0.0, False)
+
+    def test_says_how_often_the_right_one_is_there(self):
+        found = [SEEN, replace(SEEN, candidates=()), replace(SEEN, ambiguous=True), replace(SEEN, related=False)]
+        assert recall(found) == "the right placement is among those weighed in 1 of 2"
 
 
 class TestCalibration:
@@ -247,15 +321,21 @@ class TestCalibration:
         assert balanced(others).tolist() == [1.0, 0.25, 0.25, 0.25, 0.25]
 
     def test_says_how_many_of_the_accepted_are_wrong(self):
-        found = [SEEN, off(SEEN, error_m=9.0), replace(SEEN, group="office"), replace(SEEN, ambiguous=True)]
-        right = np.array([item.right for item in found])
-        sure = np.array([0.999, 0.995, 0.5, 0.999])
-        at_90, at_999 = (line.split() for line in statement(found, sure, right, [0.9, 0.999])[1:])
+        found = [
+            SEEN,
+            off(replace(SEEN, building="fr101"), error_m=9.0),
+            replace(SEEN, group="office"),
+            replace(SEEN, ambiguous=True),
+        ]
+        right = np.array([item.right_one == 0 for item in found])
+        said = Stated(np.array([0.999, 0.995, 0.5, 0.999]), right)
+        at_90, at_999 = (line.split() for line in statement(found, said, [0.9, 0.999])[1:])
         assert at_90[:3] == ["0.9", "2", "1"]
         assert at_999[:3] == ["0.999", "1", "0"]
+        assert "1 of 2 (95 % bound" in " ".join(at_90)
         assert "0.3–0.5: 1/3" in " ".join(at_90)
         assert " ".join(at_90).endswith("0 of 1 wrong")
-        assert by_group(found, sure, right, 0.9) == [
+        assert by_group(found, said, 0.9) == [
             "  office         0 accepted,   0 wrong",
             "  recorded       2 accepted,   1 wrong",
         ]

@@ -325,10 +325,16 @@ class TestOtherSettings:
         assert ran.status == 2
         assert f"--min-confidence {value}: expected a probability between 0 and 1, such as 0.99" in ran.error
 
-    def test_a_probability_that_no_placement_is_given(self, replay: Program, two: Path) -> None:
-        ran = replay.merge(two, "--min-confidence", "0.99999")
+    @pytest.mark.parametrize(
+        ("value", "flags", "most"), [("0.99999", [], 0.9999), ("0.999", ["--scale", "free"], 0.9986)]
+    )
+    def test_a_probability_that_no_placement_is_given(
+        self, replay: Program, two: Path, value: str, flags: list[str], most: float
+    ) -> None:
+        ran = replay.merge(two, "--min-confidence", value, *flags)
         assert ran.status == 2
-        assert "no placement is called surer than 0.9999" in ran.error
+        assert f"--min-confidence {value}: " in ran.error
+        assert f"expected at most {most}" in ran.error
 
     def test_no_method(self, replay: Program, two: Path) -> None:
         ran = replay.merge(two, "--method", "magic")

@@ -9,7 +9,7 @@ import pytest
 
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
-from mapmerge.match import MATCHERS, Match
+from mapmerge.match import MATCHERS, Match, Rival
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import IDENTITY
 from mapmerge.verify import Scores
@@ -45,10 +45,12 @@ class ScriptedMatcher:
         confidence=None,
         wall_agreement=0.9,
         evidence=(),
+        rival=None,
     ):
         reason = Reason(code, f"{source} does not fit {target}")
         scores = replace(self.scores(score_m), wall_agreement=wall_agreement)
-        self.answers[target, source] = Match(pose, scores, False, reason, confidence, evidence=evidence)
+        rivals = () if rival is None else (Rival(IDENTITY, 1.0, rival),)
+        self.answers[target, source] = Match(pose, scores, False, reason, confidence, rivals=rivals, evidence=evidence)
 
     @staticmethod
     def scores(score_m):

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from mapmerge.config import CellConfig, MergeConfig, RefineConfig, SearchConfig, VerifyConfig
+from mapmerge.config import HIGHEST_CONFIDENCE, CellConfig, MergeConfig, RefineConfig, SearchConfig, VerifyConfig
 from mapmerge.errors import ConfigError, GridError, MapMergeError
 
 
@@ -41,10 +41,17 @@ class TestNumbers:
         with pytest.raises(ConfigError, match="reject_m"):
             RefineConfig(reject_m=reject_m)
 
-    @pytest.mark.parametrize("value", [0.99991, 1.0, 1.001, 99.9])
+    @pytest.mark.parametrize("value", [1.001, 99.9])
     def test_a_confidence_is_a_probability(self, value):
         with pytest.raises(ConfigError, match="min_confidence"):
             VerifyConfig(min_confidence=value)
+
+    def test_no_more_is_asked_for_than_any_placement_is_given(self):
+        most = VerifyConfig(min_confidence=HIGHEST_CONFIDENCE)
+        assert MergeConfig(verify=most).tries == 1.0
+        for config in ({"verify": VerifyConfig(min_confidence=0.99991)}, {"verify": most, "scale": "free"}):
+            with pytest.raises(ConfigError, match="called surer"):
+                MergeConfig(**config)
 
     def test_zero_is_a_fine_threshold(self):
         assert VerifyConfig(min_overlap_m2=0.0, min_matched_wall_m=0, min_confidence=0.0).min_confidence == 0.0

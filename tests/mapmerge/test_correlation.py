@@ -8,7 +8,9 @@ import pytest
 from mapmerge.config import MergeConfig, VerifyConfig
 from mapmerge.evidence import CurvesEvidence, OverlayEvidence, SurfaceEvidence
 from mapmerge.grid import Grid
+from mapmerge.match import correlation
 from mapmerge.match.correlation import CorrelationMatcher
+from mapmerge.match.weigh import Weighed
 from mapmerge.prior import Prior
 from mapmerge.reasons import ReasonCode
 from mapmerge.sim2 import IDENTITY, Sim2
@@ -54,7 +56,8 @@ def assert_swapped(there, back, at_m):
         back.confidence,
     )
     assert_inverse(there.target_from_source, back.target_from_source, at_m)
-    assert [rival.score_m for rival in there.rivals] == [rival.score_m for rival in back.rivals]
+    for name in ("score_m", "likelihood", "fit"):
+        assert [getattr(rival, name) for rival in there.rivals] == [getattr(rival, name) for rival in back.rivals]
     for one, other in zip(there.rivals, back.rivals, strict=True):
         assert_inverse(one.target_from_source, other.target_from_source, at_m)
 
@@ -64,6 +67,63 @@ def assert_placed(match, pair, limit_m=0.1, limit_deg=0.5):
     position_m, angle_deg = pair.errors(match.target_from_source)
     assert position_m < limit_m
     assert angle_deg < limit_deg
+
+
+class TestWeighed:
+    """The likeliest placement is taken, whatever it scores."""
+
+    @staticmethod
+    def preferring(row, looked_at, monkeypatch):
+        """Let another placement be the likeliest at first, and note around which ones there was a look."""
+        weigh, around = correlation.weighed, correlation._around
+        rounds = []
+
+        def weighed(pair, ranked, config, known):
+            found = weigh(pair, ranked, config, known)
+            rounds.append(found)
+            if len(rounds) > 1:
+                first = rounds[0].look.poses[0]
+                order = sorted(range(len(found.fits)), key=lambda at: not np.array_equal(found.look.poses[at], first))
+            else:
+                order = [row, *(at for at in range(len(found.fits)) if at != row)]
+            picked = Weighed(
+                found.look.rows(order),
+                tuple(found.fits[at] for at in order),
+                tuple(sorted(found.log_odds, reverse=True)),
+            )
+            if len(rounds) == 1:
+                rounds[0] = picked
+            return picked
+
+        def noted(pair, pose, scales, config):
+            looked_at.append(pose[0].tolist())
+            return around(pair, pose, scales, config)
+
+        monkeypatch.setattr(correlation, "weighed", weighed)
+        monkeypatch.setattr(correlation, "_around", noted)
+        return rounds
+
+    def test_what_competes_with_it_is_looked_for_as_well(self, monkeypatch):
+        rooms = [walled_room((8.0, 6.0), open_ends=False, ragged=seed) for seed in (1, 2)]
+        looked_at = []
+        rounds = self.preferring(1, looked_at, monkeypatch)
+        match = matched(*rooms)
+        preferred = rounds[0].look.poses[0].tolist()
+        assert looked_at[-1] == preferred
+        assert looked_at[0] != preferred
+        # the room looks the same from the other side: both ways round are weighed, and the second one was taken
+        found = match.target_from_source
+        assert min(errors(found, place, (4.0, 3.0))[0] for place in (IDENTITY, Sim2(8.0, 6.0, math.pi))) < 0.1
+        assert match.rivals
+        assert match.cues.fit == rounds[-1].fits[0]
+
+    def test_rivals_say_how_likely_they_are(self):
+        rooms = [walled_room((8.0, 6.0), open_ends=False, ragged=seed) for seed in (1, 2)]
+        match = matched(*rooms)
+        assert 0.2 < match.rivals[0].likelihood <= 1.0
+        assert [rival.score_m for rival in match.rivals] == [rival.fit.score_m for rival in match.rivals]
+        lead = match.cues.contest.lead_log_odds
+        assert max(rival.likelihood for rival in match.rivals) == pytest.approx(math.exp(-lead))
 
 
 class TestSwapped:
@@ -240,7 +300,7 @@ class TestPrior:
         true = pair.target_from_source
         match = matched(pair.target, pair.source, CONFIG, believed(Sim2(true.x_m + 0.4, true.y_m, true.yaw_rad)))
         assert pair.errors(match.target_from_source)[0] < 0.25 * BAY_M
-        assert match.cues.contest.lead_odds > 1.0
+        assert match.cues.contest.lead_log_odds > 1.0
 
     @pytest.mark.parametrize("swapped", [False, True])
     def test_that_the_maps_contradict(self, swapped):

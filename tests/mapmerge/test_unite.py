@@ -209,6 +209,13 @@ class TestWitnesses:
     def test_that_are_contested_or_saw_too_little_are_not(self, strict, code):
         assert self.outcome(strict, code=code).status is Status.UNMERGED
 
+    @pytest.mark.parametrize(
+        ("rival", "status"), [(0.04, Status.MERGED), (0.06, Status.UNMERGED), (3.0, Status.UNMERGED)]
+    )
+    @pytest.mark.parametrize("code", [ReasonCode.LOW_CONFIDENCE, ReasonCode.WALLS_DISAGREE])
+    def test_that_have_a_rival_are_not_whatever_they_were_refused_for(self, strict, rival, status, code):
+        assert self.outcome(strict, rival=rival, code=code).status is status
+
     def test_walls_most_of_which_disagree_are_none(self, strict):
         """However sure they are otherwise, and how many."""
         assert self.outcome(strict, 0.9999, 0.9999, wall_agreement=0.69).status is Status.UNMERGED

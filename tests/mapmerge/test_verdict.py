@@ -1,5 +1,6 @@
 """Whether a placement is accepted and, in words, why or why not."""
 
+import math
 import re
 from dataclasses import replace
 
@@ -7,7 +8,7 @@ import pytest
 
 from mapmerge.config import VerifyConfig
 from mapmerge.match import Match, Rival
-from mapmerge.match.verdict import contradicted, judge, too_little_structure
+from mapmerge.match.verdict import contradicted, is_far_likelier, judge, too_little_structure
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
@@ -58,10 +59,11 @@ class TestJudge:
             ({"wall_agreement": 0.7}, {}, ReasonCode.WALLS_DISAGREE, "70%"),
             ({"wall_agreement": 0.79}, {}, ReasonCode.WALLS_DISAGREE, "79%"),
             ({"score_m": -3.0}, {}, ReasonCode.WALLS_DISAGREE, "95%"),
-            ({"wall_agreement": 0.7}, {"lead_odds": 0.1}, ReasonCode.WALLS_DISAGREE, "70%"),
-            ({}, {"lead_odds": 0.1}, ReasonCode.AMBIGUOUS, "0.90 times as likely"),
-            ({}, {"lead_odds": -3.0}, ReasonCode.AMBIGUOUS, "1.00 times as likely"),
-            ({}, {"lead_odds": 2.99}, ReasonCode.AMBIGUOUS, "0.050 times as likely"),
+            ({"wall_agreement": 0.7}, {"lead_log_odds": 0.1}, ReasonCode.WALLS_DISAGREE, "70%"),
+            ({}, {"lead_log_odds": 0.1}, ReasonCode.AMBIGUOUS, "0.90 times as likely"),
+            ({}, {"lead_log_odds": -3.0}, ReasonCode.AMBIGUOUS, "20 times as likely"),
+            ({}, {"lead_log_odds": -9.0}, ReasonCode.AMBIGUOUS, "more than 1000 times as likely"),
+            ({}, {"lead_log_odds": 2.99}, ReasonCode.AMBIGUOUS, "0.050 times as likely"),
             ({}, {}, ReasonCode.LOW_CONFIDENCE, "40 m²"),
         ],
     )
@@ -76,7 +78,7 @@ class TestJudge:
         assert judge(replace(GOOD, **exactly), CUES, SURE, LIMITS).code is ReasonCode.ACCEPTED
 
     def test_only_the_confidence_decides_over_what_is_large_enough_and_not_hopeless(self):
-        poor = replace(GOOD, wall_agreement=0.71), among(likeness=0.99, lead_odds=0.0)
+        poor = replace(GOOD, wall_agreement=0.71), among(likeness=0.99, lead_log_odds=0.0)
         assert judge(*poor, SURE, LIMITS).code is ReasonCode.ACCEPTED
 
     @pytest.mark.parametrize("confidence", [0.1, 1.0])
@@ -85,9 +87,9 @@ class TestJudge:
         assert reason.code is ReasonCode.WALLS_DISAGREE
         assert "69% agree, less than 70%" in reason.message
 
-    @pytest.mark.parametrize(("lead_odds", "says"), [(12.0, "less than 0.001"), (5.0, "0.007"), (1.0, "0.37")])
-    def test_says_how_likely_the_next_best_is(self, lead_odds, says):
-        assert f"{says} times as likely" in judge(GOOD, among(lead_odds=lead_odds), SURE, LIMITS).message
+    @pytest.mark.parametrize(("lead_log_odds", "says"), [(12.0, "less than 0.001"), (5.0, "0.007"), (1.0, "0.37")])
+    def test_says_how_likely_the_next_best_is(self, lead_log_odds, says):
+        assert f"{says} times as likely" in judge(GOOD, among(lead_log_odds=lead_log_odds), SURE, LIMITS).message
 
     @pytest.mark.parametrize("change", [{"overlap_m2": 5.97}, {"matched_wall_m": 7.999}])
     def test_a_near_miss_does_not_read_like_a_contradiction(self, change):
@@ -124,6 +126,27 @@ class TestStructure:
             assert reason.message == "one of the maps shows no wall at all"
 
 
+class TestFarLikelier:
+    """Than a placement that fits the maps as well as any."""
+
+    HERE = Match(Sim2(), GOOD, True, Reason(ReasonCode.ACCEPTED, "fits"), cues=CUES)
+
+    @pytest.mark.parametrize(("log_odds", "is_likelier"), [(3.1, True), (2.9, False), (-5.0, False)])
+    def test_by_the_odds_not_by_the_score(self, log_odds, is_likelier):
+        found = replace(
+            self.HERE, scores=replace(GOOD, score_m=1.0), cues=among(log_odds=CUES.contest.log_odds + log_odds)
+        )
+        assert is_far_likelier(found, self.HERE, LIMITS) is is_likelier
+
+    @pytest.mark.parametrize("change", [{"overlap_m2": 5.9}, {"matched_wall_m": 7.9}, {"wall_agreement": 0.69}])
+    def test_not_where_the_maps_share_or_agree_too_little(self, change):
+        found = replace(self.HERE, scores=replace(GOOD, **change), cues=among(log_odds=30.0))
+        assert not is_far_likelier(found, self.HERE, LIMITS)
+
+    def test_a_method_without_odds_cannot_tell(self):
+        assert not is_far_likelier(replace(self.HERE, cues=None), self.HERE, LIMITS)
+
+
 class TestContradicted:
     PRIOR = Prior(Sim2(5.0, 1.0, 0.3), 0.1, 0.1, 0.02, "given for r2")
     REASON = Reason(ReasonCode.WALLS_DISAGREE, "of the walls in the overlap 12% agree")
@@ -140,6 +163,16 @@ class TestContradicted:
         assert match.rivals == (Rival(Sim2(-1.0, 2.0, 1.0), 70.0), *self.BELIEVED.rivals)
         for words in ("given for r2", self.REASON.message, "x -1.00 m", "y 2.00 m", "yaw 1.000 rad"):
             assert words in match.reason.message
+
+    def test_says_how_likely_that_is_where_the_method_can_tell(self):
+        match, elsewhere = (
+            replace(item, cues=among(log_odds=log_odds))
+            for item, log_odds in ((self.BELIEVED, 1.0), (self.ELSEWHERE, 5.0))
+        )
+        pair = pair_of_maps(flat(), flat(), self.PRIOR)
+        assert contradicted(match, elsewhere, self.PRIOR, pair, LIMITS).rivals[0].likelihood == pytest.approx(
+            math.exp(4.0)
+        )
 
     def test_without_a_placement_the_believed_one_is_shown_with_its_figures(self):
         nothing = Match(None, None, False, Reason(ReasonCode.NO_CANDIDATE, "no placement at all was found"))

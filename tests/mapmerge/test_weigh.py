@@ -7,7 +7,7 @@ import pytest
 
 from mapmerge.align import poses_of
 from mapmerge.config import MergeConfig, SearchConfig, VerifyConfig
-from mapmerge.match.confidence import odds
+from mapmerge.match.confidence import log_odds_of
 from mapmerge.match.look import scored
 from mapmerge.match.weigh import likeliest_first, weighed
 from mapmerge.sim2 import Sim2
@@ -29,9 +29,10 @@ def test_the_likeliest_comes_first_whatever_it_scores():
     last = replace(look, poses=look.poses[::-1].copy(), scores_m=np.array([9.0, 8.0, 7.0, 6.0, 5.0]))
     found = weighed(FLATS, last, CONFIG)
     assert found.look.poses[0] == pytest.approx(poses_of([TRUTH])[0])
-    assert sorted(found.log_odds) == sorted(odds(fit) for fit in found.fits)
-    assert found.contest.odds == found.log_odds[0]
-    assert found.contest.lead_odds > 5.0
+    assert found.log_odds == tuple(log_odds_of(fit) for fit in found.fits)
+    assert list(found.log_odds) == sorted(found.log_odds, reverse=True)
+    assert found.contest.log_odds == found.log_odds[0]
+    assert found.contest.lead_log_odds > 5.0
 
 
 @pytest.mark.parametrize(("most", "count"), [(1, 1), (3, 3), (9, 5)])
@@ -39,6 +40,15 @@ def test_so_many_at_most(most, count):
     look = replace(ranked(TRUTH, *OFF), scores_m=np.array([9.0, 8.0, 7.0, 6.0, 5.0]))
     found = weighed(FLATS, look, replace(CONFIG, search=SearchConfig(weighed=most)))
     assert len(found.fits) == len(found.look.poses) == len(found.log_odds) == count
+
+
+def test_what_is_known_already_is_not_computed_again(monkeypatch):
+    look, known = replace(ranked(TRUTH, *OFF), scores_m=np.array([9.0, 8.0, 7.0, 6.0, 5.0])), {}
+    first = weighed(FLATS, look, CONFIG, known)
+    assert len(known) == 5
+    monkeypatch.setattr("mapmerge.match.weigh.fit_of", None)
+    again = weighed(FLATS, look, CONFIG, known)
+    assert (again.fits, again.log_odds) == (first.fits, first.log_odds)
 
 
 def test_what_scores_much_less_is_not_weighed():

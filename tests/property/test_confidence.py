@@ -6,7 +6,7 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapmerge.match.confidence import confidence, contest, odds
+from mapmerge.match.confidence import confidence, contest, log_odds_of
 from mapmerge.match.cues import Fit
 
 shares = st.floats(0.0, 1.0)
@@ -20,6 +20,7 @@ def fits(draw):
     return Fit(
         score_m=score_m,
         contradicted_m=contradicted_m,
+        wall_agreement=draw(shares),
         matched_wall_m=draw(lengths_m),
         slack_agreement=draw(shares),
         far_share=draw(shares),
@@ -40,7 +41,7 @@ def solidity(score_m, contradicted_m):
 def sure(first, others=()):
     """Return the confidence of the first of some placements."""
     everything = [first, *others]
-    return confidence(contest(everything, [odds(fit) for fit in everything]))
+    return confidence(contest(everything, [log_odds_of(fit) for fit in everything]))
 
 
 def better(fit, share):
@@ -77,7 +78,7 @@ def test_is_a_probability(fit, others):
 
 @given(fits(), st.lists(fits(), max_size=4), shares)
 def test_less_against_it_never_lowers_it(fit, others, share):
-    assert odds(better(fit, share)) >= odds(fit) - ROUNDING
+    assert log_odds_of(better(fit, share)) >= log_odds_of(fit) - ROUNDING
     assert sure(better(fit, share), others) >= sure(fit, others) - ROUNDING
 
 
@@ -94,7 +95,7 @@ def test_one_more_rival_never_raises_it(fit, others, rival):
 @given(fits().filter(lambda fit: fit.score_m >= fit.contradicted_m), st.floats(1.0, 5.0))
 def test_more_of_the_same_never_lowers_it(fit, factor):
     """Where more speaks against a placement than for it, more of the same is more against it."""
-    assert odds(larger(fit, factor)) >= odds(fit) - ROUNDING
+    assert log_odds_of(larger(fit, factor)) >= log_odds_of(fit) - ROUNDING
     assert sure(larger(fit, factor)) >= sure(fit) - ROUNDING
 
 
