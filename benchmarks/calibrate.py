@@ -23,7 +23,7 @@ from mapmerge.match import calibration
 from mapmerge.match.confidence import stated_confidence
 
 _LINE = 120
-_THRESHOLDS = (0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999)
+_THRESHOLDS = (0.8, 0.9, 0.91, 0.92, 0.93, 0.95, 0.98, 0.99, 0.999)
 
 
 def source_of(models: Models) -> str:

@@ -233,7 +233,7 @@ class VerifyConfig(Settings):
     least_agreement: float = 0.7
     poor_agreement: float = 0.8
     rival_likelihood: float = 0.05
-    min_confidence: float = 0.95
+    min_confidence: float = 0.92
     witness_confidence: float = 0.8
     nearly_sure_confidence: float = 0.9
     hopeful_confidence: float = 0.05

@@ -143,7 +143,7 @@ def _placing_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--min-confidence",
         metavar="P",
-        default="0.95",
+        default="0.92",
         help="least probability that a placement is right (default: %(default)s; how many are wrong at each: "
         "docs/benchmarks.md); the methods existing and paper state none and ignore it",
     )

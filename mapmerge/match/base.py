@@ -61,7 +61,8 @@ class Match:
         How far the match is trusted against those of other pairs, where the method has a measure of its own; None:
         by its score.
     rivals
-        Distinct placements of the same pair, best first.
+        Distinct placements of the same pair: the likeliest first, but those that share too little last; by their score
+        where the method does not tell how likely they are.
     evidence
         What each step of the matcher saw, in order.
     """

@@ -8,6 +8,7 @@ import pytest
 
 from mapmerge.grid import Grid
 from mapmerge.match import MATCHERS, Match, load_matcher
+from mapmerge.match.weigh import shares_too_little
 from mapmerge.prior import Prior
 from mapmerge.reasons import ReasonCode
 from mapmerge.render import MAX_SIDE_PX, render
@@ -88,6 +89,13 @@ def promise(method):
     return PROMISES[method]
 
 
+def standing(rival):
+    """Return what rivals are sorted by: how likely they are, those that share too little last; else by score."""
+    if rival.fit is None or rival.likelihood is None:
+        return (-rival.score_m,)
+    return shares_too_little(rival.fit, CONFIG.verify), -rival.likelihood
+
+
 def checked(match: Match) -> Match:
     """Return the match, once all that holds for every match is found to hold."""
     assert match.accepted == (match.reason.code is ReasonCode.ACCEPTED)
@@ -105,10 +113,9 @@ def checked(match: Match) -> Match:
     if match.accepted:
         assert match.target_from_source is not None
         assert match.evidence
-    rivals = [rival.score_m for rival in match.rivals]
-    if match.reason.code is ReasonCode.PRIOR_CONTRADICTED:
-        rivals = rivals[1:]
-    assert rivals == sorted(rivals, reverse=True)
+    rivals = match.rivals[1:] if match.reason.code is ReasonCode.PRIOR_CONTRADICTED else match.rivals
+    order = [standing(rival) for rival in rivals]
+    assert order == sorted(order)
     assert len({evidence.step for evidence in match.evidence}) == len(match.evidence)
     for evidence in match.evidence:
         picture = render(evidence).rgb

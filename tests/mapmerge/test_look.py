@@ -96,7 +96,7 @@ class TestDistinct:
 
 def judged(poses, *scores_m):
     """Return placements with these scores, and figures of no matter."""
-    others = np.ones((3, len(scores_m)))
+    others = np.ones((2, len(scores_m)))
     return Look(poses_of(poses), np.array(scores_m), *others)
 
 
