@@ -92,7 +92,7 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
     scores = verify(pair.target.map, pair.source.map, best, config.verify)
     cues = Cues(found.fits[0], found.contest)
     sure = confidence(cues.contest, config.tries)
-    reason = judge(scores, cues, sure, config.verify)
+    reason = judge(scores, cues, sure, config.verify, found.other_half(config.verify))
     return Match(
         target_from_source=pair.between_maps(best),
         scores=scores,

@@ -8,7 +8,7 @@ from dataclasses import replace
 from mapmerge.config import VerifyConfig
 from mapmerge.match.base import Match, Rival
 from mapmerge.match.confidence import times_as_likely
-from mapmerge.match.cues import Cues
+from mapmerge.match.cues import Cues, Fit
 from mapmerge.match.pair import DescribedMap, PairOfMaps
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
@@ -26,8 +26,18 @@ def too_little_structure(target: DescribedMap, source: DescribedMap, config: Ver
     return Reason(ReasonCode.TOO_LITTLE_STRUCTURE, message)
 
 
-def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig) -> Reason:
-    """Return why a placement is accepted or, what speaks most against it first, why not."""
+def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig, other_half: Fit | None = None) -> Reason:
+    """Return why a placement is accepted or, what speaks most against it first, why not.
+
+    Parameters
+    ----------
+    scores, cues, confidence
+        Of the placement.
+    config
+        Settings.
+    other_half
+        How the maps fit where they do as well turned by half, see `mapmerge.match.weigh.Weighed.other_half`.
+    """
     for what, found, least, unit in (
         ("m² of ground", scores.overlap_m2, config.min_overlap_m2, "m²"),
         ("m of wall", scores.matched_wall_m, config.min_matched_wall_m, "m"),
@@ -40,6 +50,12 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig) -
         floor = f"less than {config.least_agreement:.0%}"
         message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree, {floor}"
         return Reason(ReasonCode.WALLS_DISAGREE, message)
+    if other_half is not None:
+        areas = f"on {other_half.overlap_m2:.0f} m² instead of {scores.overlap_m2:.0f} m²"
+        message = (
+            f"turned by half, walls agree as well, {areas}: either half of a symmetric building may have been seen"
+        )
+        return Reason(ReasonCode.AMBIGUOUS, message)
     rival = times_as_likely(-cues.contest.lead_log_odds)
     if confidence >= config.min_confidence:
         message = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,6 +15,8 @@ from mapmerge.match.confidence import contest, log_odds_of
 from mapmerge.match.cues import Contest, Fit, fit_of
 from mapmerge.match.look import Look
 from mapmerge.match.pair import PairOfMaps
+
+_OTHER_HALF_SHARE = 0.15
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +41,22 @@ class Weighed:
     def contest(self) -> Contest:
         """How the first one stands among them."""
         return contest(self.fits, self.log_odds)
+
+    def other_half(self, config: VerifyConfig) -> Fit | None:
+        """Return how the maps fit where they are turned by half against the first placement, if they do as well there.
+
+        The halves of a symmetric building look alike. That one placement lets the maps overlap more, and so has more
+        that speaks for it, does not say which half was seen.
+        """
+        best, *others = self.fits
+        turns_rad = np.abs(np.remainder(self.look.poses[1:, 2] - self.look.poses[0, 2], math.tau) - math.pi)
+        least_m = _OTHER_HALF_SHARE * best.matched_wall_m
+        for fit, turn_rad in zip(others, turns_rad.tolist(), strict=True):
+            is_other_half = turn_rad <= 2 * config.distinct_rad and not shares_too_little(fit, config)
+            fits_as_well = fit.slack_agreement >= best.slack_agreement
+            if is_other_half and fits_as_well and fit.matched_wall_m >= least_m:
+                return fit
+        return None
 
 
 def weighed(pair: PairOfMaps, ranked: Look, config: MergeConfig, known: dict[bytes, Fit] | None = None) -> Weighed:

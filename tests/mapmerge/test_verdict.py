@@ -87,6 +87,12 @@ class TestJudge:
         assert reason.code is ReasonCode.WALLS_DISAGREE
         assert "69% agree, less than 70%" in reason.message
 
+    @pytest.mark.parametrize("confidence", [0.1, 0.9999])
+    def test_the_other_half_of_a_symmetric_building_contests_it_however_sure_it_is(self, confidence):
+        reason = judge(GOOD, CUES, confidence, LIMITS, replace(CUES.fit, overlap_m2=9.0))
+        assert reason.code is ReasonCode.AMBIGUOUS
+        assert "turned by half, walls agree as well, on 9 m² instead of 40 m²" in reason.message
+
     @pytest.mark.parametrize(("lead_log_odds", "says"), [(12.0, "less than 0.001"), (5.0, "0.007"), (1.0, "0.37")])
     def test_says_how_likely_the_next_best_is(self, lead_log_odds, says):
         assert f"{says} times as likely" in judge(GOOD, among(lead_log_odds=lead_log_odds), SURE, LIMITS).message

@@ -1,5 +1,6 @@
 """Candidates weighed against each other."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,8 +9,8 @@ import pytest
 from mapmerge.align import poses_of
 from mapmerge.config import MergeConfig, SearchConfig, VerifyConfig
 from mapmerge.match.confidence import log_odds_of
-from mapmerge.match.look import scored
-from mapmerge.match.weigh import likeliest_first, weighed
+from mapmerge.match.look import Look, scored
+from mapmerge.match.weigh import Weighed, likeliest_first, weighed
 from mapmerge.sim2 import Sim2
 from tests.cues import FIT
 from tests.floors import flat, pair_of_maps
@@ -59,6 +60,31 @@ def test_of_placements_that_all_contradict_the_maps_the_best_is_weighed():
     look = ranked(*OFF)
     found = weighed(FLATS, replace(look, scores_m=-np.arange(1.0, 5.0)), CONFIG)
     assert found.look.poses.tolist() == look.poses[:1].tolist()
+
+
+class TestOtherHalf:
+    """Of a symmetric building either half may have been seen."""
+
+    @staticmethod
+    def found(turn_rad, **changes):
+        poses = poses_of([Sim2(), Sim2(5.0, 3.0, turn_rad)])
+        look = Look(poses, np.array([60.0, 20.0]), np.array([45.0, 20.0]), np.array([0.95, 0.95]))
+        other = replace(FIT, **{"overlap_m2": 10.0, "matched_wall_m": 15.0, **changes})
+        return Weighed(look, (FIT, other), (6.0, -3.0)).other_half(VerifyConfig())
+
+    @pytest.mark.parametrize("turn_rad", [math.pi, -math.pi + 0.1, 3 * math.pi])
+    def test_where_walls_agree_as_well_it_contests(self, turn_rad):
+        assert self.found(turn_rad).overlap_m2 == 10.0
+
+    @pytest.mark.parametrize("turn_rad", [0.0, math.pi / 2, math.pi - 0.3])
+    def test_other_turns_do_not(self, turn_rad):
+        assert self.found(turn_rad) is None
+
+    @pytest.mark.parametrize(
+        "change", [{"slack_agreement": 0.96}, {"overlap_m2": 5.9}, {"matched_wall_m": 7.9}, {"matched_wall_m": 6.0}]
+    )
+    def test_nor_does_what_fits_worse_or_shares_too_little(self, change):
+        assert self.found(math.pi, **change) is None
 
 
 class TestOrder:
