@@ -281,12 +281,12 @@ class MergeConfig(Settings):
         least, largest = self.scale_range
         if not least <= largest:
             raise ConfigError(f"scale_range is {self.scale_range}; expected the smaller factor first")
-        most = 1.0 - self.tries * (1.0 - HIGHEST_CONFIDENCE)
+        most = HIGHEST_CONFIDENCE / (HIGHEST_CONFIDENCE + self.tries * (1.0 - HIGHEST_CONFIDENCE))
         if self.verify.min_confidence > most + 1e-9:
             limit = math.floor(most * 1e4 + 1e-6) / 1e4
             raise ConfigError(
-                f"min_confidence is {self.verify.min_confidence}; expected at most {limit}, "
-                f"for with the scale {self.scale!r} no placement is called surer"
+                f"min_confidence is {self.verify.min_confidence}; expected at most {limit}: "
+                f"where the scale is {self.scale}, no placement is called surer"
             )
 
     @property

@@ -90,7 +90,9 @@ def _input_arguments(parser: argparse.ArgumentParser) -> None:
         help="a recording, as PATH or ROBOT=PATH: .bag, ROS 2 bag folder, .db3, .mcap, or a saved map's .yaml",
     )
     group = parser.add_argument_group("which maps")
-    group.add_argument("--robots", metavar="R1,R2,…", help="robots to merge, the reference first (default: all)")
+    group.add_argument(
+        "--robots", metavar="R1,R2,…", help="robots to merge, the reference first (default: all, by name)"
+    )
     group.add_argument(
         "--topic",
         action="append",
@@ -243,7 +245,7 @@ def _probability(text: str) -> float:
     except ValueError:
         probability = math.nan
     if not 0.0 < probability < 1.0:
-        raise UsageError(f"--min-confidence {text}: expected a probability between 0 and 1, such as 0.99")
+        raise UsageError(f"--min-confidence {text}: expected a probability above 0 and below 1, such as 0.99")
     return probability
 
 

@@ -122,8 +122,12 @@ def confidence(standing: Contest, tries: float = 1.0) -> float:
     tries
         It is the best of so many independent searches, each of which might have found a wrong one.
     """
-    stated = stated_confidence(_CONFIDENCE.log_odds(standing), standing.crowd)
-    return max(0.0, 1.0 - tries * (1.0 - stated))
+    return after_tries(stated_confidence(_CONFIDENCE.log_odds(standing), standing.crowd), tries)
+
+
+def after_tries(confidence: float, tries: float) -> float:
+    """Return a confidence once its odds are divided by the number of searches that it is the best of."""
+    return confidence / (confidence + tries * (1.0 - confidence))
 
 
 def stated_confidence(log_odds: float, crowd: float) -> float:

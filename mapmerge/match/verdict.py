@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from mapmerge.config import VerifyConfig
 from mapmerge.match.base import Match, Rival
-from mapmerge.match.confidence import times_as_likely
+from mapmerge.match.confidence import UNRIVALLED, times_as_likely
 from mapmerge.match.cues import Cues, Fit
 from mapmerge.match.pair import DescribedMap, PairOfMaps
 from mapmerge.prior import Prior
@@ -45,7 +45,7 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig, o
         if found < least:
             message = f"the maps share {_down(found, 1):.1f} {what}, less than {least:g} {unit}"
             return Reason(ReasonCode.TOO_LITTLE_OVERLAP, message)
-    doubt = f"its confidence is {_percent(confidence)}, less than {_percent(config.min_confidence)}"
+    doubt = f"the confidence is {_percent(confidence)}, less than {_percent(config.min_confidence)}"
     if scores.wall_agreement < config.least_agreement:
         floor = f"less than {config.least_agreement:.0%}"
         message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree, {floor}"
@@ -57,21 +57,22 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig, o
         )
         return Reason(ReasonCode.AMBIGUOUS, message)
     rival = times_as_likely(-cues.contest.lead_log_odds)
+    is_alone = cues.contest.lead_log_odds >= UNRIVALLED
     if confidence >= config.min_confidence:
         message = (
-            f"{scores.overlap_m2:.0f} m² overlap, walls agree {scores.wall_agreement:.2f}, "
-            f"next best placement {_times(rival)} times as likely"
+            f"{scores.overlap_m2:.0f} m² overlap, {_down(scores.wall_agreement, 2):.0%} of the walls there agree, "
+            + ("nothing else comes near" if is_alone else f"next best placement {_times(rival)} times as likely")
         )
         return Reason(ReasonCode.ACCEPTED, message)
     if scores.score_m <= 0.0 or scores.wall_agreement < config.poor_agreement:
         message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree; {doubt}"
         return Reason(ReasonCode.WALLS_DISAGREE, message)
-    if rival > config.rival_likelihood:
-        message = f"another placement is {_times(rival)} times as likely as the best one; {doubt}"
+    if rival > config.rival_likelihood and cues.contest.log_odds >= 0.0:
+        message = f"another placement is {_times(rival)} times as likely as this one; {doubt}"
         return Reason(ReasonCode.AMBIGUOUS, message)
     message = (
-        f"{scores.overlap_m2:.0f} m² overlap and {scores.matched_wall_m:.0f} m of wall that agrees, "
-        f"{_down(scores.wall_agreement, 2):.0%} of it, are not enough; {doubt}"
+        f"on {scores.overlap_m2:.0f} m² {_down(scores.wall_agreement, 2):.0%} of the walls agree, "
+        f"{scores.matched_wall_m:.0f} m: too little to tell it from chance; {doubt}"
     )
     return Reason(ReasonCode.LOW_CONFIDENCE, message)
 
@@ -91,7 +92,7 @@ def is_far_likelier(one: Match, other: Match, config: VerifyConfig) -> bool:
 
 def within(match: Match, prior: Prior) -> Match:
     """Return a refusal that says that only placements within a prior were looked at."""
-    message = f"within the placement {prior.origin}, {match.reason.message}"
+    message = f"within the spread of the placement {prior.origin}, {match.reason.message}"
     return replace(match, reason=Reason(match.reason.code, message))
 
 
@@ -105,8 +106,8 @@ def contradicted(match: Match, elsewhere: Match, prior: Prior, pair: PairOfMaps,
         return match
     true = elsewhere.target_from_source.inverse() if pair.swapped else elsewhere.target_from_source
     message = (
-        f"the placement {prior.origin} does not fit: {match.reason.message}; the maps fit at x {true.x_m:.2f} m, "
-        f"y {true.y_m:.2f} m, yaw {true.yaw_rad:.3f} rad"
+        f"within the spread of the placement {prior.origin} the maps do not fit: {match.reason.message}; they fit at "
+        f"{true.x_m:.2f},{true.y_m:.2f},{math.degrees(true.yaw_rad):.1f}deg"
     )
     return replace(
         match,
@@ -138,8 +139,8 @@ def _times(likelihood: float) -> str:
 def _percent(share: float) -> str:
     """Return a share near 1 with as many digits as tell it from 1."""
     if share >= 0.99995:
-        return "over 99.99 %"
-    return f"{_down(share * 100, 2 if share > 0.9 else 0):g} %"
+        return "over 99.99%"
+    return f"{_down(share * 100, 2 if share > 0.9 else 0 if share >= 0.01 else 2):g}%"
 
 
 def _down(value: float, digits: int) -> float:

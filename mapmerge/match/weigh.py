@@ -16,7 +16,7 @@ from mapmerge.match.cues import Contest, Fit, fit_of
 from mapmerge.match.look import Look
 from mapmerge.match.pair import PairOfMaps
 
-_OTHER_HALF_SHARE = 0.15
+_OTHER_HALF_SHARE, _SAME_SIZE = 0.15, 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,10 +49,12 @@ class Weighed:
         that speaks for it, does not say which half was seen.
         """
         best, *others = self.fits
-        turns_rad = np.abs(np.remainder(self.look.poses[1:, 2] - self.look.poses[0, 2], math.tau) - math.pi)
+        first, poses = self.look.poses[0], self.look.poses[1:]
+        turned = np.abs(np.remainder(poses[:, 2] - first[2], math.tau) - math.pi) <= 2 * config.distinct_rad
+        turned &= np.abs(np.log(poses[:, 3] / first[3])) <= _SAME_SIZE
         least_m = _OTHER_HALF_SHARE * best.matched_wall_m
-        for fit, turn_rad in zip(others, turns_rad.tolist(), strict=True):
-            is_other_half = turn_rad <= 2 * config.distinct_rad and not shares_too_little(fit, config)
+        for fit, is_turned in zip(others, turned.tolist(), strict=True):
+            is_other_half = is_turned and not shares_too_little(fit, config)
             fits_as_well = fit.slack_agreement >= best.slack_agreement
             if is_other_half and fits_as_well and fit.matched_wall_m >= least_m:
                 return fit

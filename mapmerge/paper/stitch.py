@@ -105,7 +105,10 @@ def outcome(
     poses = [between_maps(target, source, candidate.target_from_source) for candidate in found]
     best = found[0]
     if prior is not None and not prior.allows(poses[0]):
-        reason = Reason(ReasonCode.PRIOR_CONTRADICTED, f"aligned, the maps do not fit where they are {prior.origin}")
+        reason = Reason(
+            ReasonCode.PRIOR_CONTRADICTED,
+            f"once aligned, the maps lie outside of the spread of the placement {prior.origin}",
+        )
     else:
         reason = judge(best.scores, config)
     others = [item for item in zip(poses[1:], found[1:], strict=True) if not same_place(best, item[1], source, config)]

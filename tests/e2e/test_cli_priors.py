@@ -323,7 +323,7 @@ class TestOtherSettings:
     def test_no_probability(self, replay: Program, two: Path, value: str) -> None:
         ran = replay.merge(two, "--min-confidence", value)
         assert ran.status == 2
-        assert f"--min-confidence {value}: expected a probability between 0 and 1, such as 0.99" in ran.error
+        assert f"--min-confidence {value}: expected a probability above 0 and below 1, such as 0.99" in ran.error
 
     @pytest.mark.parametrize(
         ("value", "flags", "most"), [("0.99999", [], 0.9999), ("0.999", ["--scale", "free"], 0.9986)]

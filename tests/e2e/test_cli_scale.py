@@ -19,9 +19,8 @@ def mislabelled(factor):
     return in_log_order([seen("r1", 0.0, flat_map("r1", 7.0)), seen("r1", 10.0)], maps_of_r2)
 
 
-@pytest.mark.parametrize("factor", [1.1, 0.5])
+@pytest.mark.parametrize("factor", [1.1, 0.8])
 def test_a_wrong_resolution_is_made_up_for(replay: Program, factor: float) -> None:
-    """Such as 0.05 m for cells of 0.10 m."""
     ran = replay.merge(write_mcap(replay.folder / "run.mcap", mislabelled(factor)), "--scale", "free")
     assert ran.status == 0, ran.err
     found = ran.robots["r2"]
@@ -44,6 +43,15 @@ def test_a_wrong_resolution_is_made_up_for(replay: Program, factor: float) -> No
     assert (shift.x, shift.y) == pytest.approx((pose["x_m"], pose["y_m"]), abs=1e-6)
     assert 2.0 * math.atan2(turn.z, turn.w) == pytest.approx(pose["yaw_rad"], abs=1e-6)
     assert turn.z**2 + turn.w**2 == pytest.approx(1.0)
+
+
+def test_half_the_size_is_found_if_not_surely(replay: Program) -> None:
+    """Such as 0.05 m for cells of 0.10 m: of many scales one may fit by chance."""
+    flags = "--scale", "free", "--min-confidence", "0.5"
+    ran = replay.merge(write_mcap(replay.folder / "run.mcap", mislabelled(0.5)), *flags)
+    pose = ran.robots["r2"]["merged_from_map"]
+    assert pose["scale"] == pytest.approx(2.0, rel=0.01)
+    assert is_right({**pose, "scale": pose["scale"] * 0.5}, reference_from("r2"))
 
 
 def test_is_believed_without_it(replay: Program) -> None:

@@ -90,9 +90,10 @@ class TestConfidence:
 
     def test_the_best_of_many_searches_is_less_sure(self):
         unsure = among(log_odds=1.0, lead_log_odds=2.0, share=0.7, clearance=1.0)
-        doubts = [1.0 - confidence(unsure, tries) for tries in (1.0, 2.0, 1e9)]
-        assert 1.0 - HIGHEST_CONFIDENCE < doubts[0] < 0.5
-        assert doubts == pytest.approx([doubts[0], 2 * doubts[0], 1.0])
+        alone, of_two, of_many = (confidence(unsure, tries) for tries in (1.0, 2.0, 13.0))
+        assert 0.5 < alone < HIGHEST_CONFIDENCE
+        assert of_two / (1.0 - of_two) == pytest.approx(alone / (1.0 - alone) / 2)
+        assert of_many / (1.0 - of_many) == pytest.approx(alone / (1.0 - alone) / 13)
 
 
 def test_odds_fall_where_walls_stand_in_free_space():

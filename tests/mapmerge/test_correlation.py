@@ -318,7 +318,7 @@ class TestPrior:
         assert free.accepted
         assert match.rivals[0].target_from_source == free.target_from_source
         assert match.rivals[0].score_m == free.scores.score_m
-        said = f"x {free.target_from_source.x_m:.2f} m, y {free.target_from_source.y_m:.2f} m"
+        said = f"{free.target_from_source.x_m:.2f},{free.target_from_source.y_m:.2f},"
         assert said in match.reason.message
 
     @pytest.mark.parametrize("right", [True, False])

@@ -66,8 +66,8 @@ class TestOtherHalf:
     """Of a symmetric building either half may have been seen."""
 
     @staticmethod
-    def found(turn_rad, **changes):
-        poses = poses_of([Sim2(), Sim2(5.0, 3.0, turn_rad)])
+    def found(turn_rad, scale=1.0, **changes):
+        poses = poses_of([Sim2(), Sim2(5.0, 3.0, turn_rad, scale)])
         look = Look(poses, np.array([60.0, 20.0]), np.array([45.0, 20.0]), np.array([0.95, 0.95]))
         other = replace(FIT, **{"overlap_m2": 10.0, "matched_wall_m": 15.0, **changes})
         return Weighed(look, (FIT, other), (6.0, -3.0)).other_half(VerifyConfig())
@@ -79,6 +79,9 @@ class TestOtherHalf:
     @pytest.mark.parametrize("turn_rad", [0.0, math.pi / 2, math.pi - 0.3])
     def test_other_turns_do_not(self, turn_rad):
         assert self.found(turn_rad) is None
+
+    def test_nor_does_another_size(self):
+        assert self.found(math.pi, 1.1) is None
 
     @pytest.mark.parametrize(
         "change", [{"slack_agreement": 0.96}, {"overlap_m2": 5.9}, {"matched_wall_m": 7.9}, {"matched_wall_m": 6.0}]
