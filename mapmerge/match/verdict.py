@@ -50,7 +50,8 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig, o
         floor = f"less than {config.least_agreement:.0%}"
         message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree, {floor}"
         return Reason(ReasonCode.WALLS_DISAGREE, message)
-    if other_half is not None:
+    # of what is as good as refused already, that says nothing: strangers fit a little in many ways
+    if other_half is not None and confidence >= config.witness_confidence:
         areas = f"on {other_half.overlap_m2:.0f} m² instead of {scores.overlap_m2:.0f} m²"
         message = (
             f"turned by half, walls agree as well, {areas}: either half of a symmetric building may have been seen"
@@ -71,8 +72,8 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig, o
         message = f"another placement is {_times(rival)} times as likely as this one; {doubt}"
         return Reason(ReasonCode.AMBIGUOUS, message)
     message = (
-        f"on {scores.overlap_m2:.0f} m² {_down(scores.wall_agreement, 2):.0%} of the walls agree, "
-        f"{scores.matched_wall_m:.0f} m: too little to tell it from chance; {doubt}"
+        f"on {scores.overlap_m2:.0f} m² {scores.matched_wall_m:.0f} m of wall agree, "
+        f"{_down(scores.wall_agreement, 2):.0%} of what can be compared; {doubt}"
     )
     return Reason(ReasonCode.LOW_CONFIDENCE, message)
 

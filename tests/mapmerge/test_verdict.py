@@ -68,10 +68,10 @@ class TestJudge:
                 {},
                 {},
                 ReasonCode.LOW_CONFIDENCE,
-                "on 40 m² 95% of the walls agree, 45 m: too little to tell it from chance",
+                "on 40 m² 45 m of wall agree, 95% of what can be compared",
             ),
             # of strangers many placements are as unlikely: they do not fit in two places, but in none
-            ({}, {"lead_log_odds": 0.1, "log_odds": -0.1}, ReasonCode.LOW_CONFIDENCE, "from chance"),
+            ({}, {"lead_log_odds": 0.1, "log_odds": -0.1}, ReasonCode.LOW_CONFIDENCE, "45 m of wall agree"),
         ],
     )
     def test_says_what_speaks_most_against_what_is_not_sure(self, scores, cues, code, says):
@@ -94,7 +94,11 @@ class TestJudge:
         assert reason.code is ReasonCode.WALLS_DISAGREE
         assert "69% agree, less than 70%" in reason.message
 
-    @pytest.mark.parametrize("confidence", [0.1, 0.9999])
+    def test_the_other_half_says_nothing_of_what_is_refused_in_any_case(self):
+        """Strangers fit a little in many ways."""
+        assert judge(GOOD, CUES, 0.1, LIMITS, CUES.fit).code is ReasonCode.LOW_CONFIDENCE
+
+    @pytest.mark.parametrize("confidence", [LIMITS.witness_confidence, 0.9999])
     def test_the_other_half_of_a_symmetric_building_contests_it_however_sure_it_is(self, confidence):
         reason = judge(GOOD, CUES, confidence, LIMITS, replace(CUES.fit, overlap_m2=9.0))
         assert reason.code is ReasonCode.AMBIGUOUS
