@@ -7,6 +7,7 @@ import heapq
 import re
 from collections.abc import Collection, Generator, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
+from itertools import combinations
 from pathlib import Path, PureWindowsPath
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
@@ -22,6 +23,7 @@ from replay.sources.zstd import MAGIC as ZSTD_MAGIC
 from replay.sources.zstd import ZstdError, decompress_file
 
 METADATA = "metadata.yaml"
+_MOST_OVERLAP_NS = 1_000_000_000
 
 _PART_SUFFIXES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 _HEAD_BYTES = 16
@@ -47,6 +49,8 @@ class Rosbag2Folder(Closing):
         with translated(path, _foreign()):
             listed = _listed_parts(path) if (path / METADATA).exists() else []
             self._parts = [_FilePart(part) for part in listed or _parts_in(path)]
+            if not listed:
+                _check_that_they_follow_each_other(path, self._parts)
 
     @classmethod
     def recognises(cls, path: Path, head: bytes) -> bool:
@@ -120,6 +124,11 @@ class _FilePart:
         with self._opened() as source:
             self.info = source.info
 
+    @property
+    def name(self) -> str:
+        """Name of the file."""
+        return self._path.name
+
     def holds(self, topics: Collection[str]) -> bool:
         """Tell whether there are messages of any of these topics."""
         return any(each.message_count and each.name in topics for each in self.info.topics)
@@ -169,6 +178,24 @@ class _FilePart:
         raise InputError(
             f"{self._path}: this part of a ROS 2 bag is neither MCAP nor SQLite; copy it again from where it was made"
         )
+
+
+def _check_that_they_follow_each_other(path: Path, parts: Sequence[_FilePart]) -> None:
+    """Refuse files that nothing says belong together if they recorded the same topic at the same times."""
+    for one, other in combinations(parts, 2):
+        shared = sorted({each.name for each in one.info.topics if each.message_count and other.holds([each.name])})
+        if shared and _overlap_ns(one.info, other.info) > _MOST_OVERLAP_NS:
+            same = f"{one.name} and {other.name} both have {shared[0]} at the same times"
+            raise InputError(
+                f"{path}: it has no {METADATA}, and {same}; expected parts of one recording: "
+                "give the files that you mean one by one"
+            )
+
+
+def _overlap_ns(one: SourceInfo, other: SourceInfo) -> int:
+    if one.start_ns is None or one.stop_ns is None or other.start_ns is None or other.stop_ns is None:
+        return 0
+    return min(one.stop_ns, other.stop_ns) - max(one.start_ns, other.start_ns)
 
 
 def _parts_in(path: Path) -> list[Path]:

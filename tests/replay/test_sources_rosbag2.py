@@ -116,14 +116,38 @@ def test_the_metadata_itself_points_to_its_folder(tmp_path: Path) -> None:
     refused(path / "metadata.yaml", "give its folder", str(path))
 
 
+# --- files that nothing says belong together
+
+
+def test_recordings_of_the_same_times_are_no_parts_of_one(tmp_path: Path) -> None:
+    """As in a folder of recordings: their maps would be mixed."""
+    (tmp_path / "runs").mkdir()
+    for name in ("monday", "tuesday"):
+        _part(tmp_path / "runs" / f"{name}.mcap", 0, 9)
+    refused(tmp_path / "runs", "no metadata.yaml", "monday.mcap and tuesday.mcap", "/r1/map", "one by one")
+
+
+@pytest.mark.parametrize("second", [(4, 9), (3, 9)])
+def test_files_that_follow_each_other_are(tmp_path: Path, second: tuple[int, int]) -> None:
+    """Or overlap by a second at most, as a recorder may let them."""
+    (tmp_path / "run").mkdir()
+    _part(tmp_path / "run" / "run_0.mcap", 0, 4)
+    _part(tmp_path / "run" / "run_1.mcap", *second)
+    with open_source(tmp_path / "run") as source:
+        assert len(list(source.messages(["/r1/map"]))) == 4
+
+
 # --- what is open at a time
 
 
 def _bag(path: Path, *parts: Path) -> Path:
-    """Make a bag without metadata of single files, in this order."""
+    """Make a bag of single files, in this order."""
     path.mkdir()
-    for index, part in enumerate(parts):
-        part.rename(path / f"part_{index}{''.join(part.suffixes)}")
+    names = [f"part_{index}{''.join(part.suffixes)}" for index, part in enumerate(parts)]
+    for name, part in zip(names, parts, strict=True):
+        part.rename(path / name)
+    listed = "".join(f"    - {name}\n" for name in names)
+    (path / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  relative_file_paths:\n{listed}")
     return path
 
 
