@@ -107,6 +107,12 @@ class Grid:
         rows, cols = np.nonzero(mask)
         return self.map_from_grid.apply(cell_centres_m(rows, cols, self.resolution_m))
 
+    @property
+    def middle_m(self) -> tuple[float, float]:
+        """Middle of the rectangle that holds all known cells, in the map frame."""
+        known = self.cropped_to_known()
+        return known.map_from_grid.apply_point(known.cols * self.resolution_m / 2, known.rows * self.resolution_m / 2)
+
     def cropped_to_known(self) -> Grid:
         """Return the smallest part of this grid that holds all its known cells; 0 × 0 if there is none."""
         known = self.known

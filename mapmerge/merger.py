@@ -140,7 +140,7 @@ def step(
     maps = {robot: grid for robot, grid in grids.items() if grid.known.any()}
     believed = _pair_priors(robots[0], list(combinations(maps, 2)), priors or {}, state.result.priors)
     alone, prepared = _matched(state, maps, updated, config, believed)
-    centres_m = {robot: _centre_m(maps[robot]) if robot in updated else state.centres_m[robot] for robot in maps}
+    centres_m = {robot: maps[robot].middle_m if robot in updated else state.centres_m[robot] for robot in maps}
     matches, forest, unions = _linked(state.unions.without(updated), maps, centres_m, alone, believed, config)
     pairs = _without_contradicted(matches, forest)
     layers = _layers(robots[0], maps, forest)
@@ -251,9 +251,3 @@ def _layers(reference: str, grids: Mapping[str, Grid], forest: Forest) -> dict[s
         for robot, placement in forest.placements.items()
         if placement.component == reference
     }
-
-
-def _centre_m(grid: Grid) -> tuple[float, float]:
-    """Return the middle of what a map knows, in its map frame."""
-    grid = grid.cropped_to_known()
-    return grid.map_from_grid.apply_point(grid.cols * grid.resolution_m / 2, grid.rows * grid.resolution_m / 2)

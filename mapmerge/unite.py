@@ -171,14 +171,9 @@ def _agree(
         target_frame, source_frame = (forest.placements[robot] for robot in (target, source))
         pose = target_frame.component_from_map @ found @ source_frame.component_from_map.inverse()
         poses.append(pose if target_frame.component == forest.placements[one[0]].component else pose.inverse())
-    at = forest.placements[one[1]].component_from_map.apply_point(*_middle_m(grids[one[1]]))
+    at = forest.placements[one[1]].component_from_map.apply_point(*grids[one[1]].middle_m)
     limits = config.verify
     return poses[0].is_close(poses[1], distance_m=limits.distinct_m, angle_rad=limits.distinct_rad, at_m=at)
-
-
-def _middle_m(grid: Grid) -> tuple[float, float]:
-    known = grid.cropped_to_known()
-    return known.map_from_grid.apply_point(known.cols * known.resolution_m / 2, known.rows * known.resolution_m / 2)
 
 
 def _is_hopeful(between: Sequence[Pair], matches: Mapping[Pair, Match], config: MergeConfig) -> bool:

@@ -20,10 +20,6 @@ Cell = tuple[int, int]
 _STEPS = [(dr, dc, math.hypot(dr, dc)) for dr in (-1, 0, 1) for dc in (-1, 0, 1) if (dr, dc) != (0, 0)]
 
 
-class NoWay(ValueError):
-    """A place cannot be reached from another."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Terrain:
     """How far every spot of a floor is from the next obstacle, on a raster.
@@ -200,7 +196,7 @@ def _shortest(prices: Sequence[Sequence[float]], start: Cell, goal: Cell) -> lis
             if total < cost.get(there, math.inf):
                 cost[there], came_from[there] = total, here
                 heapq.heappush(queue, (total + math.hypot(goal[0] - there[0], goal[1] - there[1]), there))
-    raise NoWay(f"there is no way from raster cell {start} to {goal}")
+    raise ValueError(f"there is no way from raster cell {start} to {goal}")
 
 
 def _traced(came_from: dict[Cell, Cell], goal: Cell) -> list[Cell]:
