@@ -19,7 +19,7 @@ _DIVISORS = {
     "scale_step",
     "distinct_scale",
     "length_m",
-    "stiffness",
+    "stiffness_m",
     "blur_cells",
     "radon_bin_m",
     "inlier_m",

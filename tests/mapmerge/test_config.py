@@ -1,11 +1,21 @@
 """Settings: what is refused, and where the classes of cells begin."""
 
 import math
+from dataclasses import fields
 
 import pytest
 
-from mapmerge.config import HIGHEST_CONFIDENCE, CellConfig, MergeConfig, RefineConfig, SearchConfig, VerifyConfig
+from mapmerge.config import (
+    HIGHEST_CONFIDENCE,
+    CellConfig,
+    MergeConfig,
+    RefineConfig,
+    SearchConfig,
+    SlackConfig,
+    VerifyConfig,
+)
 from mapmerge.errors import ConfigError, GridError, MapMergeError
+from mapmerge.settings import _DIVISORS, Settings
 
 
 def test_errors_form_one_tree():
@@ -35,6 +45,13 @@ class TestNumbers:
     def test_what_is_divided_by_must_be_positive(self, name):
         with pytest.raises(ConfigError, match=name):
             SearchConfig(**{name: 0})
+
+    def test_all_that_is_said_to_be_divided_by_is_a_setting(self):
+        """A setting that was renamed must not lose its check."""
+        kinds = Settings.__subclasses__()
+        assert {field.name for kind in kinds for field in fields(kind)} >= _DIVISORS
+        with pytest.raises(ConfigError, match="stiffness_m"):
+            SlackConfig(stiffness_m=0)
 
     @pytest.mark.parametrize("reject_m", [(0.8, -0.1), (math.nan,), (0.4, math.inf), (0.0,)])
     def test_distances_of_a_sequence_are_checked_one_by_one(self, reject_m):
