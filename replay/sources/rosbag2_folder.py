@@ -7,7 +7,6 @@ import heapq
 import re
 from collections.abc import Collection, Generator, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
-from itertools import combinations
 from pathlib import Path, PureWindowsPath
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
@@ -50,7 +49,7 @@ class Rosbag2Folder(Closing):
             listed = _listed_parts(path) if (path / METADATA).exists() else []
             self._parts = [_FilePart(part) for part in listed or _parts_in(path)]
             if not listed:
-                _check_that_they_follow_each_other(path, self._parts)
+                _check_that_they_belong_together(path, self._parts)
 
     @classmethod
     def recognises(cls, path: Path, head: bytes) -> bool:
@@ -180,22 +179,24 @@ class _FilePart:
         )
 
 
-def _check_that_they_follow_each_other(path: Path, parts: Sequence[_FilePart]) -> None:
-    """Refuse files that nothing says belong together if they recorded the same topic at the same times."""
-    for one, other in combinations(parts, 2):
-        shared = sorted({each.name for each in one.info.topics if each.message_count and other.holds([each.name])})
-        if shared and _overlap_ns(one.info, other.info) > _MOST_OVERLAP_NS:
-            same = f"{one.name} and {other.name} both have {shared[0]} at the same times"
-            raise InputError(
-                f"{path}: it has no {METADATA}, and {same}; expected parts of one recording: "
-                "give the files that you mean one by one"
-            )
-
-
-def _overlap_ns(one: SourceInfo, other: SourceInfo) -> int:
-    if one.start_ns is None or one.stop_ns is None or other.start_ns is None or other.stop_ns is None:
-        return 0
-    return min(one.stop_ns, other.stop_ns) - max(one.start_ns, other.start_ns)
+def _check_that_they_belong_together(path: Path, parts: Sequence[_FilePart]) -> None:
+    """Refuse files that nothing lists as parts of one recording if they have the same topic at the same times."""
+    running: list[tuple[int, _FilePart]] = []
+    for start_ns, stop_ns, part in sorted(
+        ((part.info.start_ns, part.info.stop_ns, part) for part in parts), key=lambda item: item[0] or 0
+    ):
+        if start_ns is None or stop_ns is None:
+            continue
+        running = [(until_ns, one) for until_ns, one in running if until_ns - start_ns > _MOST_OVERLAP_NS]
+        for until_ns, one in running:
+            shared = sorted(each.name for each in part.info.topics if each.message_count and one.holds([each.name]))
+            if shared and min(until_ns, stop_ns) - start_ns > _MOST_OVERLAP_NS:
+                same = f"{one.name} and {part.name} both have {shared[0]} at the same times"
+                raise InputError(
+                    f"{path}: no {METADATA} lists its files, and {same}; expected parts of one recording: "
+                    "give the files that you mean one by one"
+                )
+        running.append((stop_ns, part))
 
 
 def _parts_in(path: Path) -> list[Path]:

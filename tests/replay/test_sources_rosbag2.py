@@ -124,7 +124,15 @@ def test_recordings_of_the_same_times_are_no_parts_of_one(tmp_path: Path) -> Non
     (tmp_path / "runs").mkdir()
     for name in ("monday", "tuesday"):
         _part(tmp_path / "runs" / f"{name}.mcap", 0, 9)
-    refused(tmp_path / "runs", "no metadata.yaml", "monday.mcap and tuesday.mcap", "/r1/map", "one by one")
+    both = "monday.mcap and tuesday.mcap both have /r1/map"
+    refused(tmp_path / "runs", "no metadata.yaml lists its files", both, "one by one")
+
+
+def test_nor_are_recordings_of_which_a_short_one_lies_within_a_long_one(tmp_path: Path) -> None:
+    (tmp_path / "runs").mkdir()
+    for name, seconds in (("a_long", (0, 20)), ("b_early", (0, 1)), ("c_within", (9, 12))):
+        _part(tmp_path / "runs" / f"{name}.mcap", *seconds)
+    refused(tmp_path / "runs", "a_long.mcap and c_within.mcap", "one by one")
 
 
 @pytest.mark.parametrize("second", [(4, 9), (3, 9)])
