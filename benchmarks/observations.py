@@ -23,7 +23,6 @@ from mapmerge.grid import Grid
 from mapmerge.match import load_matcher
 from mapmerge.match.cues import Fit
 from mapmerge.sim2 import Sim2, wrap_angle
-from samples.drive import NoWay
 from samples.kinds import KINDS
 from samples.pairs import Mission, Pair, Related, mission, pairs, strangers
 
@@ -155,12 +154,9 @@ def _simulated(kind: str, first: int) -> Iterator[tuple[Pair, bool]]:
     missions: list[Mission] = []
     for seed in range(first, first + BLOCK):
         held_out = seed % BLOCK == BLOCK - 1
-        try:
-            found = mission(kind, seed)
-            related = list(pairs(found, _LEAST_OVERLAP))
-            twins = [strangers(kind, twin, next_to) for twin in _twin_seeds(seed) for next_to in TWINS]
-        except NoWay:  # a robot of this seed cannot go where it should
-            continue
+        found = mission(kind, seed)
+        related = list(pairs(found, _LEAST_OVERLAP))
+        twins = [strangers(kind, twin, next_to) for twin in _twin_seeds(seed) for next_to in TWINS]
         missions.append(found)
         chosen = rng.permutation(len(related))[:PAIRS_A_MISSION].tolist()
         yield from ((related[index], held_out) for index in chosen)

@@ -117,7 +117,7 @@ def _drawn_frame(rng: Rng) -> Sim2:
 
 
 def published(grid: Grid, published_from_map: Sim2 = IDENTITY, *, is_trinary: bool) -> Grid:
-    """Return a map as a robot publishes it: in another frame, and with free, occupied and unknown cells alone."""
+    """Return a map as a robot publishes it: in a frame of its own; trinary: free, occupied or unknown, nothing else."""
     cells = grid.cells
     if is_trinary:
         unsure = np.where(cells >= _MIN_OCCUPIED, 100, -1)
