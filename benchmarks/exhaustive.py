@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mapmerge.config import MergeConfig, VerifyConfig
 from mapmerge.grid import Grid
-from mapmerge.prepare import PreparedMap, prepare
+from mapmerge.prepare import CELL_OCCUPIED, PreparedMap, prepare
 from mapmerge.sim2 import Points, Sim2
 from mapmerge.verify import rank_score_m
 
@@ -43,7 +44,8 @@ def exhaustive(target: Grid, source: Grid) -> Sim2:
     resolution_m = max(target.resolution_m, source.resolution_m)
     maps = prepare(target, resolution_m, config), prepare(source, resolution_m, config)
     finalists = sorted(_coarse(*maps), key=lambda candidate: -candidate.score)[:_FINALISTS]
-    aligned = [aligned_finely(*maps, candidate.target_from_source) for candidate in finalists]
+    fields = _Field(maps[0]), _Field(maps[1])
+    aligned = [aligned_finely(*fields, candidate.target_from_source) for candidate in finalists]
     best = max(aligned, key=lambda placement: rank_score_m(*maps, placement, _RANKED_BY))
     return maps[0].grid.map_from_grid @ best @ maps[1].grid.map_from_grid.inverse()
 
@@ -95,31 +97,41 @@ def _peaks(surface: Image) -> list[tuple[float, int, int]]:
     return found
 
 
-def aligned_finely(target: PreparedMap, source: PreparedMap, start: Sim2) -> Sim2:
+class _Field:
+    """A map and how far each of its cells is from the nearest wall."""
+
+    def __init__(self, prepared: PreparedMap) -> None:
+        self.map = prepared
+        is_free = np.where(prepared.classes == CELL_OCCUPIED, np.uint8(0), np.uint8(255))
+        self._distance_m = cv2.distanceTransform(is_free, cv2.DIST_L2, cv2.DIST_MASK_5) * prepared.resolution_m
+
+    def near(self, walls_m: Points, width_m: float) -> float:
+        """Return how many walls are near walls; the nearer, the more one counts."""
+        away = self._distance_m.ravel()[self.map.flat_index(walls_m)].astype(np.float64) / width_m
+        return float(np.sum(np.exp(-0.5 * away**2)))
+
+
+def aligned_finely(target: _Field, source: _Field, start: Sim2) -> Sim2:
     """Return a placement nearby at which most walls lie on walls, by steps that get smaller."""
     best = start
-    middle_m = start.apply_point(0.5 * source.extent_m[0], 0.5 * source.extent_m[1])
+    width_m, height_m = source.map.extent_m
+    middle_m = start.apply_point(0.5 * width_m, 0.5 * height_m)
     around, back = Sim2(*middle_m), Sim2(-middle_m[0], -middle_m[1])
-    for step_m, step_deg, width_m in _STEPS:
-        score = _closeness(target, source, best, width_m)
+    for step_m, step_deg, blur_m in _STEPS:
+        score = _closeness(target, source, best, blur_m)
         improved = True
         while improved:
             improved = False
             for dx, dy, turn in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)):
                 move = around @ Sim2(dx * step_m, dy * step_m, math.radians(turn * step_deg)) @ back
                 moved = move @ best
-                moved_score = _closeness(target, source, moved, width_m)
+                moved_score = _closeness(target, source, moved, blur_m)
                 if moved_score > score + 1e-9:
                     best, score, improved = moved, moved_score, True
     return best
 
 
-def _closeness(target: PreparedMap, source: PreparedMap, placement: Sim2, width_m: float) -> float:
+def _closeness(target: _Field, source: _Field, placement: Sim2, width_m: float) -> float:
     """Return how much wall lies near wall, in both directions; the nearer, the more it counts."""
-    near = _near(target, placement.apply(source.walls_m), width_m)
-    return near + _near(source, placement.inverse().apply(target.walls_m), width_m)
-
-
-def _near(prepared: PreparedMap, walls_m: Points, width_m: float) -> float:
-    away = prepared.wall_distance_m.ravel()[prepared.flat_index(walls_m)].astype(np.float64) / width_m
-    return float(np.sum(np.exp(-0.5 * away**2)))
+    near = target.near(placement.apply(source.map.walls_m), width_m)
+    return near + source.near(placement.inverse().apply(target.map.walls_m), width_m)

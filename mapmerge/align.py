@@ -109,8 +109,7 @@ def _step(target: PreparedMap, walls_m: Points, poses: Poses, reject_m: float, s
     """Pair each point with its nearest wall; return the poses moved by the motion that brings the pairs together."""
     x, y = placed(poses, walls_m)
     wall = target.nearest.wall_at(x, y)
-    wall_x, wall_y = target.walls_m.astype(np.float32).T
-    error_x, error_y = wall_x[wall] - x, wall_y[wall] - y
+    error_x, error_y = target.nearest.x_m[wall] - x, target.nearest.y_m[wall] - y
     square = error_x * error_x + error_y * error_y
     # Cauchy weights: what is far apart says less
     weight = 1.0 / (1.0 + square * np.float32(1.0 / (_CAUCHY * reject_m) ** 2))

@@ -24,6 +24,8 @@ _DIRECTION_SQUARES = 7
 
 CELL_UNKNOWN, CELL_FREE, CELL_OCCUPIED, CELL_UNSURE = 0, 1, 2, 3
 MEETS_FREE, MEETS_WALL, MEETS_NEAR = 1, 2, 4
+NO_WALL = 0
+_FAR_M = 1e6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +35,11 @@ class NearestWalls:
     Parameters
     ----------
     index
-        Shape (rows, columns): for each cell the row of `PreparedMap.walls_m` that is nearest.
+        Shape (rows, columns): for each cell the number of the wall that is nearest; `NO_WALL` if none is within reach.
+    x_m, y_m
+        Where these walls are, shape (S,) each, in the order of their numbers. `NO_WALL` is far from everything.
+    directions
+        `PreparedMap.directions` in the order of these numbers, shape (S, 2).
     cell_m
         Side of a cell: `PreparedMap.wall_spacing_m`, so that each cell holds at most one of these walls.
     margin
@@ -41,11 +47,14 @@ class NearestWalls:
     """
 
     index: NDArray[np.int32]
+    x_m: NDArray[np.float32]
+    y_m: NDArray[np.float32]
+    directions: NDArray[np.float32]
     cell_m: float
     margin: int
 
     def wall_at(self, x_m: NDArray[np.float32], y_m: NDArray[np.float32]) -> NDArray[np.int32]:
-        """Return the row of the nearest wall for places of any shape; beyond the padding, that of its border."""
+        """Return the number of the nearest wall for places of any shape."""
         rows, cols = self.index.shape
         inverse, margin = np.float32(1.0 / self.cell_m), np.float32(self.margin)
         col = np.clip(x_m * inverse + margin, 0, cols - 1).astype(np.int32)
@@ -53,12 +62,11 @@ class NearestWalls:
         found: NDArray[np.int32] = self.index.ravel()[row * cols + col]
         return found
 
-    def distance_m(self, walls_m: Points, x_m: NDArray[np.float32], y_m: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return how far places are from the nearest of `PreparedMap.walls_m`; infinitely without any wall."""
-        if len(walls_m) == 0:
-            return np.full(x_m.shape, np.inf)
-        wall = self.wall_at(x_m, y_m)
-        return np.asarray(np.hypot(walls_m[wall, 0] - x_m, walls_m[wall, 1] - y_m), np.float64)
+    def distance_m(
+        self, wall: NDArray[np.int32], x_m: NDArray[np.float32], y_m: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Return how far places are from the walls of these numbers, each from one."""
+        return np.asarray(np.hypot(self.x_m[wall] - x_m, self.y_m[wall] - y_m), np.float32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,8 +80,6 @@ class PreparedMap:
     classes
         Shape (rows, columns), uint8: `CELL_UNKNOWN`, `CELL_FREE`, `CELL_OCCUPIED` or, where known as neither,
         `CELL_UNSURE`; padded by `margin` cells.
-    wall_distance_m
-        Shape as `classes`: distance of each cell to the nearest occupied one.
     meets
         Shape as `classes`, uint8: what a point there meets, bits `MEETS_FREE`, `MEETS_WALL` and `MEETS_NEAR`.
     nearest
@@ -95,7 +101,6 @@ class PreparedMap:
 
     grid: Grid
     classes: NDArray[np.uint8]
-    wall_distance_m: NDArray[np.float32]
     meets: NDArray[np.uint8]
     nearest: NearestWalls
     wall_cells_m: Points
@@ -138,15 +143,15 @@ def prepare(grid: Grid, resolution_m: float, config: MergeConfig) -> PreparedMap
     distance_m = _distance_to_walls_m(occupied, resolution_m)
     wall_cells_m = _centres(occupied, margin, resolution_m)
     spacing_m = max(config.search.wall_spacing_m, resolution_m)
-    walls_m, nearest = _walls(wall_cells_m, spacing_m, reach_m)
+    walls_m = thinned(wall_cells_m, spacing_m)
     directions = _directions(walls_m, spacing_m)
+    nearest = _nearest(walls_m, directions, spacing_m, reach_m)
     step = max(1, round(FREE_SPACING_M / resolution_m))
     free = classes == CELL_FREE
     tolerance_m = max(config.verify.tolerance_m, resolution_m)
     return PreparedMap(
         grid=cropped,
         classes=classes,
-        wall_distance_m=distance_m,
         meets=(
             free.view(np.uint8) * np.uint8(MEETS_FREE)
             + (distance_m <= tolerance_m).view(np.uint8) * np.uint8(MEETS_WALL)
@@ -206,26 +211,24 @@ def _classes_of(cells: NDArray[np.int8], config: MergeConfig) -> NDArray[np.uint
     return table.astype(np.uint8)[np.ascontiguousarray(cells).view(np.uint8)]
 
 
-def _walls(wall_cells_m: Points, spacing_m: float, reach_m: float) -> tuple[Points, NearestWalls]:
-    """Return the thinned walls, and the nearest of them for each square of that side."""
+def _nearest(walls_m: Points, directions: NDArray[np.float32], spacing_m: float, reach_m: float) -> NearestWalls:
+    """Return the nearest wall for each square of the side by which walls are thinned, if it is within reach."""
     margin = math.ceil(reach_m / spacing_m) + 1
-    if len(wall_cells_m) == 0:
-        return wall_cells_m, NearestWalls(np.zeros((1, 1), np.int32), spacing_m, margin)
-    square = np.floor(wall_cells_m / spacing_m + 1e-9).astype(np.intp) + margin
+    x_m, y_m = np.vstack([(_FAR_M, _FAR_M), walls_m]).astype(np.float32).T
+    numbered = np.vstack([np.zeros((1, 2), np.float32), directions])
+    if len(walls_m) == 0:
+        return NearestWalls(np.zeros((1, 1), np.int32), x_m, y_m, numbered, spacing_m, margin)
+    square = np.floor(walls_m / spacing_m + 1e-9).astype(np.intp) + margin
     cols, rows = (square.max(axis=0) + margin + 1).tolist()
-    member = square[:, 1] * cols + square[:, 0]
-    count = np.bincount(member, minlength=rows * cols)
-    key = np.flatnonzero(count)
-    walls_m = thinned(wall_cells_m, spacing_m)
-    _, labels = cv2.distanceTransformWithLabels(
-        np.where(count > 0, 0, 255).astype(np.uint8).reshape(rows, cols),
-        cv2.DIST_L2,
-        cv2.DIST_MASK_5,
-        labelType=cv2.DIST_LABEL_PIXEL,
+    is_empty = np.full((rows, cols), 255, np.uint8)
+    is_empty[square[:, 1], square[:, 0]] = 0
+    distance, labels = cv2.distanceTransformWithLabels(
+        is_empty, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
-    rank = np.zeros(len(key) + 1, np.int32)
-    rank[labels.ravel()[key]] = np.arange(len(key), dtype=np.int32)
-    return walls_m, NearestWalls(rank[labels], spacing_m, margin)
+    number_of = np.zeros(len(walls_m) + 1, np.int32)
+    number_of[labels[square[:, 1], square[:, 0]]] = np.arange(1, len(walls_m) + 1, dtype=np.int32)
+    index = np.where(distance <= reach_m / spacing_m, number_of[labels], np.int32(NO_WALL))
+    return NearestWalls(index, x_m, y_m, numbered, spacing_m, margin)
 
 
 def _centres(mask: Mask, margin: int, resolution_m: float) -> Points:

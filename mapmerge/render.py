@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mapmerge.drawing import AGREE, BANNER_PX, INK, MARK, MAX_SIDE_PX, PAPER, Colour, Rgb, text, titled
 from mapmerge.evidence import CurvesEvidence, Evidence, ImagesEvidence, OverlayEvidence, SurfaceEvidence
-from mapmerge.prepare import CELL_FREE, CELL_UNKNOWN, PreparedMap
+from mapmerge.prepare import CELL_FREE, CELL_UNKNOWN, MEETS_WALL, PreparedMap
 from mapmerge.render_images import side_by_side
 from mapmerge.sim2 import Points, Sim2
 
@@ -132,7 +132,7 @@ def _overlay(evidence: OverlayEvidence) -> Rgb:
         (source, back.apply(target.wall_cells_m), _WALL_TARGET, target.wall_cells_m),
     ):
         index = here.flat_index(walls)
-        matched = here.wall_distance_m.ravel()[index] <= evidence.tolerance_m
+        matched = (here.meets.ravel()[index] & MEETS_WALL) > 0
         violated = ~matched & (here.classes.ravel()[index] == CELL_FREE)
         _dots(image, at[~matched & ~violated], low, pixel_m, there)
         agree.append(at[matched])

@@ -144,10 +144,10 @@ def _direction(target: PreparedMap, source: PreparedMap, pose: Poses, config: Ve
     tolerance_m = max(config.tolerance_m, target.resolution_m)
     x, y = (values[0] for values in placed(pose, source.walls_m))
     wall = target.nearest.wall_at(x, y)
-    met = target.nearest.distance_m(target.walls_m, x, y) <= tolerance_m
+    met = target.nearest.distance_m(wall, x, y) <= tolerance_m
     if not met.any():
         return 0.0, 0.0
-    there = target.directions[wall[met]]
+    there = target.nearest.directions[wall[met]]
     cos, sin = math.cos(2.0 * float(pose[0, 2])), math.sin(2.0 * float(pose[0, 2]))
     here = source.directions[met] @ np.array([[cos, sin], [-sin, cos]])
     strength = np.hypot(*there.T) * np.hypot(*here.T)

@@ -94,16 +94,16 @@ def _bent(target: PreparedMap, x: Floats, y: Floats, spacing_m: float, config: S
     still = np.zeros((rows, cols), np.float32)
     field = _Field(still, still, corner, config.cell_m)
     index = field.index(x, y)
-    walls = target.walls_m.astype(np.float32)
+    nearest = target.nearest
     for reach_m in config.reject_m:
         shift_x, shift_y = field.at(x, y)
         at_x, at_y = x + shift_x, y + shift_y
-        wall = target.nearest.wall_at(at_x, at_y)
-        error_x, error_y = walls[wall, 0] - at_x, walls[wall, 1] - at_y
+        wall = nearest.wall_at(at_x, at_y)
+        error_x, error_y = nearest.x_m[wall] - at_x, nearest.y_m[wall] - at_y
         square = np.square(error_x) + np.square(error_y)
         weight = np.where(square <= reach_m**2, spacing_m / (1.0 + square / (0.35 * reach_m) ** 2), 0.0)
         # of a straight wall only the shift across it is known: n nᵀ for its normal n
-        cos, sin = target.directions[wall].T
+        cos, sin = nearest.directions[wall].T
         xx, xy, yy = 0.5 * weight * (1.0 - cos), -0.5 * weight * sin, 0.5 * weight * (1.0 + cos)
         sums = [
             _spread(np.bincount(index, values, rows * cols).reshape(rows, cols).astype(np.float32), config)
