@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from mapmerge.config import MergeConfig, VerifyConfig
 from mapmerge.grid import Grid
-from mapmerge.prepare import CELL_OCCUPIED, PreparedMap, prepare
+from mapmerge.prepare import prepare
+from mapmerge.prepared import CELL_OCCUPIED, PreparedMap
 from mapmerge.sim2 import Points, Sim2
 from mapmerge.verify import rank_score_m
 

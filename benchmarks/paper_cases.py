@@ -15,7 +15,8 @@ from benchmarks.exhaustive import exhaustive
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.match import Match, load_matcher
-from mapmerge.prepare import PreparedMap, prepare
+from mapmerge.prepare import prepare
+from mapmerge.prepared import PreparedMap
 from mapmerge.sim2 import Sim2, wrap_angle
 from mapmerge.verify import Scores, verify
 from replay.sources.map_image import Thresholds, cells_from_pixels

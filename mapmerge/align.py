@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.prepare import PreparedMap
+from mapmerge.prepared import PreparedMap
 from mapmerge.sim2 import Points, Sim2
 
 Poses = NDArray[np.float64]

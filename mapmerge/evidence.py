@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.prepare import PreparedMap
+from mapmerge.prepared import PreparedMap
 from mapmerge.sim2 import Points, Sim2
 
 

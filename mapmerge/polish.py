@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mapmerge.align import evenly
 from mapmerge.config import RefineConfig
-from mapmerge.prepare import CELL_OCCUPIED, PreparedMap
+from mapmerge.prepared import CELL_OCCUPIED, PreparedMap
 from mapmerge.sim2 import Points, Sim2
 
 _CONVERGED_M = 2e-4

@@ -1,12 +1,13 @@
-"""What a map is turned into before it is matched: walls as points, distance to the nearest wall, free space.
+"""Maps made ready to be matched, and kept ready while they grow: only what changed is computed again.
 
-All of it is in the frame of the map's grid, cropped to what is known: metres from the outer corner of its first cell.
+Walls are thinned and free space is sampled by squares, counted from the corner of what was known at first. With that
+corner, what is kept up to date equals, to the bit, what is computed anew: a map prepared at once is one that changed
+all over.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -14,233 +15,189 @@ from numpy.typing import NDArray
 
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid, Mask, cell_centres_m
+from mapmerge.lattice import changed_box, offset_cells
+from mapmerge.plane import Box, Plane
+from mapmerge.prepared import (
+    CELL_FREE,
+    CELL_OCCUPIED,
+    CELL_UNKNOWN,
+    CELL_UNSURE,
+    MEETS_FREE,
+    MEETS_NEAR,
+    MEETS_WALL,
+    NearestWalls,
+    PreparedMap,
+)
 from mapmerge.resample import at_resolution
-from mapmerge.sim2 import Points
+from mapmerge.walls import NO_WALL, LiveWalls
 
 FREE_SPACING_M = 0.25
 _MARGIN_M = 1.0
 _MARGIN_SLACK_M = 0.1
-_DIRECTION_SQUARES = 7
-
-CELL_UNKNOWN, CELL_FREE, CELL_OCCUPIED, CELL_UNSURE = 0, 1, 2, 3
-MEETS_FREE, MEETS_WALL, MEETS_NEAR = 1, 2, 4
-NO_WALL = 0
 _FAR_M = 1e6
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NearestWalls:
-    """Which wall is nearest to a place, as a look-up.
-
-    Parameters
-    ----------
-    index
-        Shape (rows, columns): for each cell the number of the wall that is nearest; `NO_WALL` if none is within reach.
-    x_m, y_m
-        Where these walls are, shape (S,) each, in the order of their numbers. `NO_WALL` is far from everything.
-    directions
-        `PreparedMap.directions` in the order of these numbers, shape (S, 2).
-    cell_m
-        Side of a cell: `PreparedMap.wall_spacing_m`, so that each cell holds at most one of these walls.
-    margin
-        Cells of padding on each side: a place beyond is looked up in the padding, out of the reach of ICP.
-    """
-
-    index: NDArray[np.int32]
-    x_m: NDArray[np.float32]
-    y_m: NDArray[np.float32]
-    directions: NDArray[np.float32]
-    cell_m: float
-    margin: int
-
-    def wall_at(self, x_m: NDArray[np.float32], y_m: NDArray[np.float32]) -> NDArray[np.int32]:
-        """Return the number of the nearest wall for places of any shape."""
-        rows, cols = self.index.shape
-        inverse, margin = np.float32(1.0 / self.cell_m), np.float32(self.margin)
-        col = np.clip(x_m * inverse + margin, 0, cols - 1).astype(np.int32)
-        row = np.clip(y_m * inverse + margin, 0, rows - 1).astype(np.int32)
-        found: NDArray[np.int32] = self.index.ravel()[row * cols + col]
-        return found
-
-    def distance_m(
-        self, wall: NDArray[np.int32], x_m: NDArray[np.float32], y_m: NDArray[np.float32]
-    ) -> NDArray[np.float32]:
-        """Return how far places are from the walls of these numbers, each from one."""
-        return np.asarray(np.hypot(self.x_m[wall] - x_m, self.y_m[wall] - y_m), np.float32)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PreparedMap:
-    """One map, ready to be matched.
-
-    Parameters
-    ----------
-    grid
-        The map at the working resolution, cropped to what is known.
-    classes
-        Shape (rows, columns), uint8: `CELL_UNKNOWN`, `CELL_FREE`, `CELL_OCCUPIED` or, where known as neither,
-        `CELL_UNSURE`; padded by `margin` cells.
-    meets
-        Shape as `classes`, uint8: what a point there meets, bits `MEETS_FREE`, `MEETS_WALL` and `MEETS_NEAR`.
-    nearest
-        The nearest of `walls_m` for each place.
-    wall_cells_m
-        Centres of all occupied cells, shape (N, 2).
-    walls_m
-        The same thinned to one point per `SearchConfig.wall_spacing_m`, shape (M, 2).
-    directions
-        For each of `walls_m` which way the wall runs, shape (M, 2): cosine and sine of twice the angle, shorter than 1
-        where it is no straight line.
-    free_m
-        Free space, one point per about `FREE_SPACING_M`, shape (K, 2).
-    wall_spacing_m, free_spacing_m
-        What one of these points stands for: metres of wall, and the side of a square of free space.
-    margin
-        Cells of padding on each side.
-    """
-
-    grid: Grid
-    classes: NDArray[np.uint8]
-    meets: NDArray[np.uint8]
-    nearest: NearestWalls
-    wall_cells_m: Points
-    walls_m: Points
-    directions: NDArray[np.float32]
-    free_m: Points
-    wall_spacing_m: float
-    free_spacing_m: float
-    margin: int
-
-    @property
-    def resolution_m(self) -> float:
-        """Side of a cell."""
-        return self.grid.resolution_m
-
-    @property
-    def extent_m(self) -> tuple[float, float]:
-        """Width and height of what is known."""
-        return self.grid.cols * self.resolution_m, self.grid.rows * self.resolution_m
-
-    def flat_index(self, points_m: Points) -> NDArray[np.intp]:
-        """Return the index into the raveled padded arrays of the cell at each point.
-
-        Points outside get index 0, a corner of the padding: unknown and far from any wall.
-        """
-        rows, cols = self.classes.shape
-        col = np.floor(points_m[:, 0] / self.resolution_m).astype(np.intp) + self.margin
-        row = np.floor(points_m[:, 1] / self.resolution_m).astype(np.intp) + self.margin
-        inside = (col >= 0) & (col < cols) & (row >= 0) & (row < rows)
-        return np.where(inside, row * cols + col, 0)
+_BAND_CELLS = 1024
+_ROUNDING = 1e-9
 
 
 def prepare(grid: Grid, resolution_m: float, config: MergeConfig) -> PreparedMap:
     """Prepare a map for matching at a resolution that is not finer than its own."""
-    cropped = at_resolution(grid.cropped_to_known(), resolution_m, config.cells)
-    reach_m = max(_MARGIN_M, *config.refine.rough_reject_m, *config.refine.reject_m) + _MARGIN_SLACK_M
-    margin = math.ceil(reach_m / resolution_m) + 1
-    classes = np.pad(_classes_of(cropped.cells, config), margin, constant_values=CELL_UNKNOWN)
-    occupied = classes == CELL_OCCUPIED
-    distance_m = _distance_to_walls_m(occupied, resolution_m)
-    wall_cells_m = _centres(occupied, margin, resolution_m)
-    spacing_m = max(config.search.wall_spacing_m, resolution_m)
-    walls_m = thinned(wall_cells_m, spacing_m)
-    directions = _directions(walls_m, spacing_m)
-    nearest = _nearest(walls_m, directions, spacing_m, reach_m)
-    step = max(1, round(FREE_SPACING_M / resolution_m))
-    free = classes == CELL_FREE
-    tolerance_m = max(config.verify.tolerance_m, resolution_m)
-    return PreparedMap(
-        grid=cropped,
-        classes=classes,
-        meets=(
+    return LiveMap(resolution_m, config).update(grid)
+
+
+class LiveMap:
+    """One robot's map, kept ready to be matched.
+
+    Parameters
+    ----------
+    resolution_m
+        At which it is matched; not finer than its own.
+    config
+        Settings.
+    """
+
+    def __init__(self, resolution_m: float, config: MergeConfig) -> None:
+        self._resolution_m = resolution_m
+        self._config = config
+        reach_m = max(_MARGIN_M, *config.refine.rough_reject_m, *config.refine.reject_m) + _MARGIN_SLACK_M
+        self._margin = math.ceil(max(reach_m, config.verify.near_m, config.verify.tolerance_m) / resolution_m) + 1
+        self._spacing_m = max(config.search.wall_spacing_m, resolution_m)
+        self._reach_squares = reach_m / self._spacing_m
+        self._free_step = max(1, round(FREE_SPACING_M / resolution_m))
+        self._classes_of = _class_table(config)
+        self._grid: Grid | None = None
+        self._first = (0, 0)
+        self._forget()
+
+    def update(self, grid: Grid) -> PreparedMap:
+        """Take in the map as it is now, and return it; what was returned before must not be used any more."""
+        known = at_resolution(grid.cropped_to_known(), self._resolution_m, self._config.cells)
+        changed = None if self._grid is None else changed_box(self._grid, known)
+        if self._grid is None or changed is None:
+            return self._anew(known)
+        rows, cols = offset_cells(self._grid, known) or (0, 0)
+        self._first = self._first[0] + rows, self._first[1] + cols
+        self._take(known, changed.shifted(*self._first))
+        return self._published(known)
+
+    def renewed(self) -> PreparedMap | None:
+        """Return the last map as if it were the first, computed anew; None if that is what it is already.
+
+        So the outcome of a search depends on the maps alone, and not on how they came about.
+        """
+        if self._grid is None or all(
+            first % self._free_step == 0 and self._starts_square(first) for first in self._first
+        ):
+            return None
+        return self._anew(self._grid)
+
+    def _starts_square(self, cell: int) -> bool:
+        squares = cell / self._walls.squares.cells
+        return abs(squares - round(squares)) < _ROUNDING
+
+    def _anew(self, known: Grid) -> PreparedMap:
+        self._forget()
+        self._take(known, Box(0, 0, *known.cells.shape))
+        return self._published(known)
+
+    def _forget(self) -> None:
+        self._first = (0, 0)
+        self._classes, self._meets = Plane(np.uint8), Plane(np.uint8)
+        self._walls = LiveWalls(self._spacing_m / self._resolution_m, self._reach_squares)
+        self._free_rows, self._free_cols = np.empty(0, np.int64), np.empty(0, np.int64)
+        self._known = 0
+
+    def _take(self, known: Grid, changed: Box) -> None:
+        """Renew what depends on the changed cells, which are counted on the lattice."""
+        self._grid = known
+        covered = Box(0, 0, *known.cells.shape).shifted(*self._first)
+        self._known -= int(np.count_nonzero(self._classes.read(changed.within(self._classes.box))))
+        padded = Box(*np.add(covered, (-self._margin, -self._margin, self._margin, self._margin)).tolist())
+        for plane in (self._classes, self._meets):
+            plane.cover(padded)
+        self._classes.part(changed.within(padded))[:] = CELL_UNKNOWN
+        inside = changed.within(covered)
+        cells = np.ascontiguousarray(known.cells[inside.slices(covered)])
+        classes = self._classes_of[cells.view(np.uint8)]
+        self._classes.part(inside)[:] = classes
+        self._known += int(np.count_nonzero(classes))
+        for band in changed.padded(self._reach_of_meets).within(padded).bands(_BAND_CELLS):
+            self._meet(band)
+        self._sample_free(covered, changed)
+        occupied = self._classes.part(covered) == CELL_OCCUPIED
+        self._walls.update(occupied, covered, changed)
+
+    @property
+    def _tolerance_m(self) -> float:
+        return max(self._config.verify.tolerance_m, self._resolution_m)
+
+    @property
+    def _reach_of_meets(self) -> int:
+        """How many cells around a wall what a point meets may depend on it."""
+        return math.ceil(max(self._config.verify.near_m, self._tolerance_m) / self._resolution_m) + 2
+
+    def _meet(self, box: Box) -> None:
+        """Find what a point in each cell of a box meets."""
+        around = box.padded(self._reach_of_meets)
+        classes = self._classes.read(around)
+        inner = box.slices(around)
+        distance_m = _distance_to_walls_m(classes == CELL_OCCUPIED, self._resolution_m)[inner]
+        free = classes[inner] == CELL_FREE
+        self._meets.part(box)[:] = (
             free.view(np.uint8) * np.uint8(MEETS_FREE)
-            + (distance_m <= tolerance_m).view(np.uint8) * np.uint8(MEETS_WALL)
-            + (distance_m <= config.verify.near_m).view(np.uint8) * np.uint8(MEETS_NEAR)
-        ),
-        nearest=nearest,
-        wall_cells_m=wall_cells_m,
-        walls_m=walls_m,
-        directions=directions,
-        free_m=_sampled(free, margin, resolution_m, step),
-        wall_spacing_m=spacing_m,
-        free_spacing_m=step * resolution_m,
-        margin=margin,
-    )
+            + (distance_m <= self._tolerance_m).view(np.uint8) * np.uint8(MEETS_WALL)
+            + (distance_m <= self._config.verify.near_m).view(np.uint8) * np.uint8(MEETS_NEAR)
+        )
+
+    def _sample_free(self, covered: Box, changed: Box) -> None:
+        """Collect every so many cells, along both axes, that is free, in the rows of a box."""
+        step = self._free_step
+        rows = Box(changed.top, covered.left, changed.bottom, covered.right).within(covered)
+        down, across = (step // 2 - rows.top) % step, (step // 2 - rows.left) % step
+        row, col = np.nonzero(self._classes.part(rows)[down::step, across::step] == CELL_FREE)
+        begin, end = np.searchsorted(self._free_rows, (changed.top, changed.bottom))
+        parts = (self._free_rows, row * step + rows.top + down), (self._free_cols, col * step + rows.left + across)
+        self._free_rows, self._free_cols = (np.concatenate([old[:begin], new, old[end:]]) for old, new in parts)
+
+    def _published(self, known: Grid) -> PreparedMap:
+        walls, cell_m = self._walls, self._resolution_m
+        row, col = self._first
+        x_m, y_m = ((values + (0.5 - first)) * cell_m for values, first in ((walls.cols, col), (walls.rows, row)))
+        x_m[NO_WALL], y_m[NO_WALL] = _FAR_M, _FAR_M
+        corner_m = (
+            (walls.nearest.box.left * walls.squares.cells - col) * cell_m,
+            (walls.nearest.box.top * walls.squares.cells - row) * cell_m,
+        )
+        index = walls.nearest.cells
+        nearest = NearestWalls(
+            index if index.size else np.full((1, 1), NO_WALL, np.int32),
+            x_m.astype(np.float32),
+            y_m.astype(np.float32),
+            walls.directions,
+            self._spacing_m,
+            corner_m,
+        )
+        return PreparedMap(
+            grid=known,
+            known_area_m2=self._known * cell_m**2,
+            classes=self._classes.cells,
+            meets=self._meets.cells,
+            nearest=nearest,
+            wall_cells_m=cell_centres_m(walls.cell_rows - row, walls.cell_cols - col, cell_m),
+            walls_m=np.stack([x_m[walls.numbers], y_m[walls.numbers]], axis=1),
+            directions=walls.directions[walls.numbers],
+            free_m=cell_centres_m(self._free_rows - row, self._free_cols - col, cell_m),
+            wall_spacing_m=self._spacing_m,
+            free_spacing_m=self._free_step * cell_m,
+            margin=self._margin,
+        )
 
 
-def thinned(points_m: Points, spacing_m: float) -> Points:
-    """Return the mean point of each occupied square of this side, row by row."""
-    if len(points_m) == 0:
-        return points_m
-    square = np.floor(points_m / spacing_m + 1e-9).astype(np.intp)
-    square -= square.min(axis=0)
-    member = square[:, 1] * (int(square[:, 0].max()) + 1) + square[:, 0]
-    count = np.bincount(member)
-    key = np.flatnonzero(count)
-    sums = [np.bincount(member, weights=points_m[:, axis])[key] for axis in (0, 1)]
-    means: Points = np.stack(sums, axis=1) / count[key][:, None]
-    return means
-
-
-def _directions(walls_m: Points, spacing_m: float) -> NDArray[np.float32]:
-    """Return which way each wall runs, from the spread of the walls around it."""
-    if len(walls_m) == 0:
-        return np.zeros((0, 2), np.float32)
-    square = np.floor(walls_m / spacing_m + 1e-9).astype(np.intp)
-    cols, rows = (square.max(axis=0) + 1).tolist()
-    centre_m = walls_m.mean(axis=0)
-    x, y = (walls_m - centre_m).T
-    moments = np.zeros((6, rows, cols))
-    moments[:, square[:, 1], square[:, 0]] = (np.ones_like(x), x, y, x * x, y * y, x * y)
-    size = (_DIRECTION_SQUARES, _DIRECTION_SQUARES)
-    around = [
-        cv2.boxFilter(image, cv2.CV_64F, size, normalize=False, borderType=cv2.BORDER_CONSTANT) for image in moments
-    ]
-    count, sum_x, sum_y, sum_xx, sum_yy, sum_xy = (image[square[:, 1], square[:, 0]] for image in around)
-    xx, yy, xy = sum_xx - sum_x**2 / count, sum_yy - sum_y**2 / count, sum_xy - sum_x * sum_y / count
-    total = np.maximum(xx + yy, 1e-9)
-    return np.stack([(xx - yy) / total, 2 * xy / total], axis=1).astype(np.float32)
-
-
-def _classes_of(cells: NDArray[np.int8], config: MergeConfig) -> NDArray[np.uint8]:
+def _class_table(config: MergeConfig) -> NDArray[np.uint8]:
+    """Return the class of each value of a cell, by its byte."""
     value = np.arange(256, dtype=np.uint8).view(np.int8)
     known = np.where(value <= config.cells.max_free_percent, CELL_FREE, CELL_UNSURE)
-    table = np.where(
-        value < 0, CELL_UNKNOWN, np.where(value >= config.cells.min_occupied_percent, CELL_OCCUPIED, known)
-    )
-    return table.astype(np.uint8)[np.ascontiguousarray(cells).view(np.uint8)]
-
-
-def _nearest(walls_m: Points, directions: NDArray[np.float32], spacing_m: float, reach_m: float) -> NearestWalls:
-    """Return the nearest wall for each square of the side by which walls are thinned, if it is within reach."""
-    margin = math.ceil(reach_m / spacing_m) + 1
-    x_m, y_m = np.vstack([(_FAR_M, _FAR_M), walls_m]).astype(np.float32).T
-    numbered = np.vstack([np.zeros((1, 2), np.float32), directions])
-    if len(walls_m) == 0:
-        return NearestWalls(np.zeros((1, 1), np.int32), x_m, y_m, numbered, spacing_m, margin)
-    square = np.floor(walls_m / spacing_m + 1e-9).astype(np.intp) + margin
-    cols, rows = (square.max(axis=0) + margin + 1).tolist()
-    is_empty = np.full((rows, cols), 255, np.uint8)
-    is_empty[square[:, 1], square[:, 0]] = 0
-    distance, labels = cv2.distanceTransformWithLabels(
-        is_empty, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    number_of = np.zeros(len(walls_m) + 1, np.int32)
-    number_of[labels[square[:, 1], square[:, 0]]] = np.arange(1, len(walls_m) + 1, dtype=np.int32)
-    index = np.where(distance <= reach_m / spacing_m, number_of[labels], np.int32(NO_WALL))
-    return NearestWalls(index, x_m, y_m, numbered, spacing_m, margin)
-
-
-def _centres(mask: Mask, margin: int, resolution_m: float) -> Points:
-    rows, cols = np.nonzero(mask)
-    return cell_centres_m(rows - margin, cols - margin, resolution_m)
-
-
-def _sampled(free: Mask, margin: int, resolution_m: float, step: int) -> Points:
-    """Return the centre of every so many cells, along both axes, that is free."""
-    rows, cols = np.nonzero(free[step // 2 :: step, step // 2 :: step])
-    first = step // 2 - margin
-    return cell_centres_m(rows * step + first, cols * step + first, resolution_m)
+    occupied = np.where(value >= config.cells.min_occupied_percent, CELL_OCCUPIED, known)
+    return np.where(value < 0, CELL_UNKNOWN, occupied).astype(np.uint8)
 
 
 def _distance_to_walls_m(occupied: Mask, resolution_m: float) -> NDArray[np.float32]:

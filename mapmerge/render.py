@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mapmerge.drawing import AGREE, BANNER_PX, INK, MARK, MAX_SIDE_PX, PAPER, Colour, Rgb, text, titled
 from mapmerge.evidence import CurvesEvidence, Evidence, ImagesEvidence, OverlayEvidence, SurfaceEvidence
-from mapmerge.prepare import CELL_FREE, CELL_UNKNOWN, MEETS_WALL, PreparedMap
+from mapmerge.prepared import CELL_FREE, CELL_UNKNOWN, MEETS_WALL, PreparedMap
 from mapmerge.render_images import side_by_side
 from mapmerge.sim2 import Points, Sim2
 

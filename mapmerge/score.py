@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mapmerge.align import Poses, evenly, inverses, placed
 from mapmerge.config import VerifyConfig
-from mapmerge.prepare import MEETS_FREE, MEETS_NEAR, MEETS_WALL, PreparedMap
+from mapmerge.prepared import MEETS_FREE, MEETS_NEAR, MEETS_WALL, PreparedMap
 from mapmerge.sim2 import Points
 
 Lengths = NDArray[np.float64]

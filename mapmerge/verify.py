@@ -13,7 +13,7 @@ import numpy as np
 
 from mapmerge.align import poses_of
 from mapmerge.config import VerifyConfig
-from mapmerge.prepare import CELL_FREE, CELL_OCCUPIED, CELL_UNKNOWN, PreparedMap
+from mapmerge.prepared import CELL_FREE, CELL_OCCUPIED, CELL_UNKNOWN, PreparedMap
 from mapmerge.score import Agreement, agreement, probe
 from mapmerge.sim2 import Sim2
 

@@ -14,7 +14,8 @@ from mapmerge.grid import Grid
 from mapmerge.match import Match, Matcher
 from mapmerge.match.correlation import CorrelationMatcher
 from mapmerge.match.pair import DescribedMap, PairOfMaps
-from mapmerge.prepare import PreparedMap, prepare
+from mapmerge.prepare import prepare
+from mapmerge.prepared import PreparedMap
 from mapmerge.prior import Prior
 from mapmerge.sim2 import IDENTITY, Sim2, wrap_angle
 from samples.drive import Pace, follow, route, stops, survey, tour, window

@@ -11,7 +11,7 @@ from mapmerge.align import Poses, placed, poses_of
 from mapmerge.config import MergeConfig, VerifyConfig
 from mapmerge.match.pair import PairOfMaps
 from mapmerge.match.slack import slack
-from mapmerge.prepare import PreparedMap
+from mapmerge.prepared import PreparedMap
 from mapmerge.score import far_share
 from mapmerge.sim2 import Sim2
 from mapmerge.verify import verified

@@ -14,7 +14,8 @@ from mapmerge.paper.pixels import PIXEL_UNKNOWN, Image, class_pixels
 from mapmerge.paper.ransac import drawn_models
 from mapmerge.paper.show import keypoints_evidence, pairs_evidence
 from mapmerge.paper.stitch import MIN_FEATURES, allowed, bounds_of, candidates, outcome, refused, with_known_scale
-from mapmerge.prepare import PreparedMap, prepare
+from mapmerge.prepare import prepare
+from mapmerge.prepared import PreparedMap
 from mapmerge.prior import Prior
 from mapmerge.reasons import ReasonCode
 from mapmerge.sim2 import Points, Sim2

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mapmerge.align import Poses, composed, inverses, poses_of
 from mapmerge.match.spectrum import Spectra
-from mapmerge.prepare import PreparedMap
+from mapmerge.prepared import PreparedMap
 from mapmerge.prior import Prior
 from mapmerge.sim2 import Sim2
 

@@ -26,7 +26,8 @@ from mapmerge.paper.stitch import (
     refused,
     with_known_scale,
 )
-from mapmerge.prepare import PreparedMap, prepare
+from mapmerge.prepare import prepare
+from mapmerge.prepared import PreparedMap
 from mapmerge.prior import Prior
 from mapmerge.reasons import ReasonCode
 from mapmerge.sim2 import Points, Sim2

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mapmerge.align import placed, poses_of
 from mapmerge.config import SlackConfig
-from mapmerge.prepare import PreparedMap
+from mapmerge.prepared import PreparedMap
 from mapmerge.score import Tally, far_share, met_at, tally
 from mapmerge.sim2 import Sim2
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmerge.align import Poses
-from mapmerge.prepare import PreparedMap
+from mapmerge.prepared import PreparedMap
 from mapmerge.sim2 import Points, Sim2
 
 Surface = NDArray[np.float32]

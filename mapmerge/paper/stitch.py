@@ -12,7 +12,7 @@ from mapmerge.config import MergeConfig, RansacConfig, VerifyConfig
 from mapmerge.evidence import Evidence, OverlayEvidence
 from mapmerge.match.base import Match, Rival
 from mapmerge.paper.ransac import Bounds, Models
-from mapmerge.prepare import PreparedMap
+from mapmerge.prepared import PreparedMap
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Points, Sim2

@@ -14,9 +14,9 @@ from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
 from mapmerge.merger import MergeResult
 from mapmerge.outcome import RobotOutcome, Status
-from mapmerge.prepare import thinned
 from mapmerge.resample import at_resolution
 from mapmerge.sim2 import Points, Sim2
+from mapmerge.walls import thinned
 from replay.sinks.rerun_entities import MERGED, MERGED_MAP, EntityPath, RobotEntities
 from replay.sinks.rerun_layout import Box, Layout, PointM, lay_out
 from replay.sinks.rerun_stream import RrdStream

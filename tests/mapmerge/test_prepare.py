@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mapmerge.grid import Grid
-from mapmerge.prepare import (
+from mapmerge.prepare import prepare
+from mapmerge.prepared import (
     CELL_FREE,
     CELL_OCCUPIED,
     CELL_UNKNOWN,
@@ -14,10 +15,9 @@ from mapmerge.prepare import (
     MEETS_FREE,
     MEETS_NEAR,
     MEETS_WALL,
-    prepare,
-    thinned,
 )
 from mapmerge.sim2 import Sim2
+from mapmerge.walls import thinned
 from tests.floors import CONFIG, drawn, filled, flat, prepared_map, within
 
 
