@@ -152,7 +152,8 @@ class LiveMap:
         """Collect every so many cells, along both axes, that is free, in the rows of a box."""
         step = self._free_step
         rows = Box(changed.top, covered.left, changed.bottom, covered.right).within(covered)
-        down, across = (step // 2 - rows.top) % step, (step // 2 - rows.left) % step
+        first = step // 2 - self._margin
+        down, across = (first - rows.top) % step, (first - rows.left) % step
         row, col = np.nonzero(self._classes.part(rows)[down::step, across::step] == CELL_FREE)
         begin, end = np.searchsorted(self._free_rows, (changed.top, changed.bottom))
         parts = (self._free_rows, row * step + rows.top + down), (self._free_cols, col * step + rows.left + across)
