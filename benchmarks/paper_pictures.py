@@ -9,12 +9,13 @@ import numpy as np
 
 from benchmarks.paper_cases import Case, Outcome
 from mapmerge.config import MergeConfig
-from mapmerge.fuse import Layer, fuse
+from mapmerge.fuse import fuse
 from mapmerge.grid import Grid
 from mapmerge.merger import MergeResult
 from mapmerge.paper.pixels import class_pixels
 from mapmerge.render import Rgb, render
 from mapmerge.sim2 import IDENTITY
+from mapmerge.warp import Layer
 
 _STEPS = ("keypoints", "inliers", "overlay")
 _MAX_SIDE_PX = 1000

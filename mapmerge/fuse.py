@@ -9,7 +9,7 @@ The canvas is worked on in tiles: memory is that of the outcome and a few tiles.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,24 +17,16 @@ from numpy.typing import NDArray
 
 from mapmerge.config import CellConfig
 from mapmerge.grid import MAX_PERCENT, Cells, Grid
-from mapmerge.resample import at_resolution
+from mapmerge.lattice import changed_box, offset_cells
+from mapmerge.plane import NOTHING, Box, Plane
 from mapmerge.sim2 import Sim2
+from mapmerge.warp import Bytes, Layer, Warp, warped
 
 _TILE_CELLS = 2048
 _UNIT = 1_000_000
 _P_MIN = 0.01
-_UNKNOWN_BYTE = 255
 
-Bytes = NDArray[np.uint8]
 Whole = NDArray[np.int32]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Layer:
-    """One placed map: the grid and where its map frame lies in the merged frame."""
-
-    grid: Grid
-    merged_from_map: Sim2
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,24 +56,32 @@ class Fusion:
     agreements: tuple[Agreement, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Warp:
-    """A layer on the canvas: its cells as bytes, and the affine map from canvas cells to its own."""
-
-    cells: Bytes
-    cell_from_canvas: NDArray[np.float64]
-    box: tuple[int, int, int, int]
-
-
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _Counts:
-    """Cells counted over all tiles for one layer."""
+    """Cells counted over some tiles for one layer."""
 
     known: int = 0
-    others_known: int = 0
     overlap: int = 0
     agree: int = 0
     disagree: int = 0
+
+    def plus(self, other: _Counts, sign: int = 1) -> _Counts:
+        """Return these and the other cells or, with a sign of -1, these without the others."""
+        return _Counts(
+            self.known + sign * other.known,
+            self.overlap + sign * other.overlap,
+            self.agree + sign * other.agree,
+            self.disagree + sign * other.disagree,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fused:
+    """A tile: its fused cells, how each layer agrees with the others on it, and how many cells any of them knows."""
+
+    cells: Cells
+    counts: Mapping[str, _Counts]
+    known: int
 
 
 def fuse(layers: Sequence[Layer], lattice: Grid, config: CellConfig) -> Fusion:
@@ -99,22 +99,98 @@ def fuse(layers: Sequence[Layer], lattice: Grid, config: CellConfig) -> Fusion:
     Fusion
         The merged map in the merged frame, and the agreements in the order of the layers.
     """
-    warps = [_warp(layer, lattice, config) for layer in layers]
-    boxes = np.array([warp.box for warp in warps if warp.cells.size], dtype=np.int64).reshape(-1, 4)
-    if len(boxes) == 0:
-        empty = Grid(lattice.cells[:0, :0], lattice.resolution_m, lattice.map_from_grid)
-        return Fusion(empty, tuple(Agreement(0.0, 0.0, 0.0) for _ in layers))
-    row, col = int(boxes[:, 0].min()), int(boxes[:, 1].min())
-    cells = np.full((int(boxes[:, 2].max()) - row, int(boxes[:, 3].max()) - col), -1, np.int8)
-    odds = _LogOdds(config)
-    counts = [_Counts() for _ in layers]
-    for top, left, bottom, right in _tiles(*cells.shape):
-        tiles = [_tile(warp, (row + top, col + left, row + bottom, col + right)) for warp in warps]
-        if any(tile is not None for tile in tiles):
-            cells[top:bottom, left:right] = odds.fuse(tiles, counts)
-    corner = Sim2(col * lattice.resolution_m, row * lattice.resolution_m)
-    grid = Grid(cells, lattice.resolution_m, lattice.map_from_grid @ corner)
-    return Fusion(grid, tuple(_agreement(count, lattice.resolution_m**2) for count in counts))
+    return Canvas(config).update({str(number): layer for number, layer in enumerate(layers)}, lattice)
+
+
+class Canvas:
+    """A merged map that is kept up to date: only cells under what changed are fused again.
+
+    Parameters
+    ----------
+    config
+        When a cell is occupied or free.
+    """
+
+    def __init__(self, config: CellConfig) -> None:
+        self._config = config
+        self._odds = _LogOdds(config)
+        self._lattice: Grid | None = None
+        self._warps: dict[str, Warp] = {}
+        self._counts: dict[str, _Counts] = {}
+        self._known = 0
+        self._cells = Plane(np.uint8)  # values of cells and 1, so that 0 is unknown
+        self._grid: Grid | None = None
+
+    def update(self, layers: Mapping[str, Layer], lattice: Grid) -> Fusion:
+        """Return what is fused of these layers, by name; the same grid as before if none of its cells can differ.
+
+        Parameters
+        ----------
+        layers
+            The placed maps, in any order.
+        lattice
+            The reference's map, as in `fuse`.
+        """
+        if self._lattice is None or offset_cells(self._lattice, lattice) is None:
+            self._lattice, self._grid = lattice, None
+            self._warps, self._counts, self._known, self._cells = {}, {}, 0, Plane(np.uint8)
+        warps = {name: self._warp(name, layer, self._lattice) for name, layer in layers.items()}
+        dirty = NOTHING
+        for name in {**self._warps, **warps}:
+            dirty = dirty.union(self._dirty(self._warps.get(name), warps.get(name)))
+        covered = NOTHING
+        for warp in warps.values():
+            covered = covered.union(warp.box)
+        before, self._warps = self._warps, warps
+        self._counts = {name: self._counts.get(name, _Counts()) for name in warps}
+        resized = covered != self._cells.box
+        self._cells.cover(covered)
+        for tile in _tiles(dirty):
+            self._renew(tile, before)
+        if self._grid is None or resized or not dirty.is_empty:
+            self._grid = self._published(self._lattice)
+        cell_m2 = lattice.resolution_m**2
+        return Fusion(self._grid, tuple(_agreement(count, self._known, cell_m2) for count in self._counts.values()))
+
+    def _warp(self, name: str, layer: Layer, lattice: Grid) -> Warp:
+        known = self._warps.get(name)
+        if known is not None and known.layer.is_same(layer):
+            return known
+        return warped(layer, lattice, self._config)
+
+    def _dirty(self, before: Warp | None, after: Warp | None) -> Box:
+        """Return the cells of the canvas that one layer may have changed."""
+        if before is after:
+            return NOTHING
+        both = (before.box if before else NOTHING).union(after.box if after else NOTHING)
+        if before is None or after is None or before.layer.merged_from_map != after.layer.merged_from_map:
+            return both
+        changed = changed_box(before.layer.grid, after.layer.grid)
+        if changed is None or before.is_pooled or after.is_pooled:
+            return both
+        return after.on_canvas(changed).within(both)
+
+    def _renew(self, tile: Box, before: Mapping[str, Warp]) -> None:
+        """Fuse the cells of a tile, and count them instead of what was there before."""
+        self._count_again(self._odds.fuse(_on(tile, before)), -1)
+        fused = self._odds.fuse(_on(tile, self._warps))
+        self._count_again(fused, 1)
+        inside = tile.within(self._cells.box)
+        cells = fused.cells[inside.slices(tile)].view(np.uint8) + np.uint8(1) if fused else np.uint8(0)
+        self._cells.part(inside)[:] = cells
+
+    def _count_again(self, fused: _Fused | None, sign: int) -> None:
+        if fused is None:
+            return
+        self._known += sign * fused.known
+        for name in fused.counts.keys() & self._counts.keys():
+            self._counts[name] = self._counts[name].plus(fused.counts[name], sign)
+
+    def _published(self, lattice: Grid) -> Grid:
+        box = self._cells.box
+        corner = Sim2(box.left * lattice.resolution_m, box.top * lattice.resolution_m)
+        cells = (self._cells.cells - np.uint8(1)).view(np.int8)
+        return Grid(cells, lattice.resolution_m, lattice.map_from_grid @ corner)
 
 
 class _LogOdds:
@@ -130,19 +206,18 @@ class _LogOdds:
         self._occupied = int(table[config.min_occupied_percent])
         self._free = int(table[config.max_free_percent])
 
-    def fuse(self, tiles: Sequence[Bytes | None], counts: Sequence[_Counts]) -> Cells:
-        """Return the fused cells of one tile that some layer reaches, and count how the layers agree."""
-        present = [(tile, count) for tile, count in zip(tiles, counts, strict=True) if tile is not None]
-        positive, negative = self._sums([tile for tile, _ in present])
-        layers_known = np.zeros(present[0][0].shape, np.int32)
-        for tile, _ in present:
+    def fuse(self, tiles: Mapping[str, Bytes]) -> _Fused | None:
+        """Fuse what is on a tile of the layers that reach it; None if none does."""
+        if not tiles:
+            return None
+        present = list(tiles.values())
+        positive, negative = self._sums(present)
+        layers_known = np.zeros(present[0].shape, np.int32)
+        for tile in present:
             layers_known += tile <= MAX_PERCENT
-        for tile, count in present:
-            self._count(tile, positive, negative, layers_known, count)
-        anything = int(np.count_nonzero(layers_known))
-        for absent in (count for tile, count in zip(tiles, counts, strict=True) if tile is None):
-            absent.others_known += anything
-        return self._values([tile for tile, _ in present], positive, negative, layers_known)
+        cells = self._values(present, positive, negative, layers_known)
+        counts = {name: self._count(tile, positive, negative, layers_known) for name, tile in tiles.items()}
+        return _Fused(cells, counts, int(np.count_nonzero(layers_known)))
 
     def _sums(self, tiles: Sequence[Bytes]) -> tuple[Whole, Whole]:
         positive, negative = self._positive[tiles[0]], self._negative[tiles[0]]
@@ -160,24 +235,22 @@ class _LogOdds:
             values[shared] = _fused_percent(positive[shared], negative[shared])
         return values
 
-    def _count(self, tile: Bytes, positive: Whole, negative: Whole, layers_known: Whole, count: _Counts) -> None:
+    def _count(self, tile: Bytes, positive: Whole, negative: Whole, layers_known: Whole) -> _Counts:
         known = tile <= MAX_PERCENT
         others = layers_known - known
-        count.known += int(np.count_nonzero(known))
-        count.others_known += int(np.count_nonzero(others))
         both = known & (others > 0)
-        shared = int(np.count_nonzero(both))
-        count.overlap += shared
-        if not shared:
-            return
         own = tile[both]
         own_up, own_down = self._positive[own], self._negative[own]
         up, down = positive[both] - own_up, negative[both] - own_down
         theirs, mine = _kept(up, down), own_up + own_down
         occupied = (mine >= self._occupied, theirs >= self._occupied)
         free = (mine <= self._free, theirs <= self._free)
-        count.agree += int(np.count_nonzero((occupied[0] & occupied[1]) | (free[0] & free[1])))
-        count.disagree += int(np.count_nonzero((occupied[0] & free[1]) | (free[0] & occupied[1])))
+        return _Counts(
+            known=int(np.count_nonzero(known)),
+            overlap=len(own),
+            agree=int(np.count_nonzero((occupied[0] & occupied[1]) | (free[0] & free[1]))),
+            disagree=int(np.count_nonzero((occupied[0] & free[1]) | (free[0] & occupied[1]))),
+        )
 
 
 def _kept(positive: Whole, negative: Whole) -> Whole:
@@ -193,62 +266,22 @@ def _fused_percent(positive: Whole, negative: Whole) -> Cells:
     return np.where(kept == 0, -1, percent).astype(np.int8)
 
 
-def _warp(layer: Layer, lattice: Grid, config: CellConfig) -> _Warp:
-    """Place a layer's known part on the lattice; a finer map is pooled first, so that thin walls stay."""
-    scale = layer.merged_from_map.scale
-    known = layer.grid.cropped_to_known()
-    coarse_m = lattice.resolution_m / scale
-    grid = at_resolution(known, coarse_m, config) if coarse_m > known.resolution_m else known
-    lattice_from_grid = lattice.map_from_grid.inverse() @ layer.merged_from_map @ grid.map_from_grid
-    linear = lattice_from_grid.linear * (grid.resolution_m / lattice.resolution_m)
-    shift = np.array([lattice_from_grid.x_m, lattice_from_grid.y_m]) / lattice.resolution_m
-    linear, shift = _snapped(linear, shift)
-    corners = np.array([[0, 0], [grid.cols, 0], [0, grid.rows], [grid.cols, grid.rows]]) @ linear.T + shift
-    low, high = np.floor(corners.min(axis=0) + 1e-6), np.ceil(corners.max(axis=0) - 1e-6)
-    inverse = np.linalg.inv(linear)
-    cell_from_canvas = np.hstack([inverse, (-inverse @ shift)[:, None]])
-    box = (int(low[1]), int(low[0]), int(high[1]), int(high[0]))
-    return _Warp(grid.cells.view(np.uint8), cell_from_canvas, box)
+def _tiles(box: Box) -> Iterator[Box]:
+    for top in range(box.top, box.bottom, _TILE_CELLS):
+        for left in range(box.left, box.right, _TILE_CELLS):
+            yield Box(top, left, min(box.bottom, top + _TILE_CELLS), min(box.right, left + _TILE_CELLS))
 
 
-def _snapped(
-    linear: NDArray[np.float64], shift: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a map that is a whole shift but for rounding errors as exactly that, so that cells are copied as is."""
-    whole = np.rint(shift)
-    if np.allclose(linear, np.eye(2), rtol=0, atol=1e-7) and np.allclose(shift, whole, rtol=0, atol=1e-3):
-        return np.eye(2), whole
-    return linear, shift
+def _on(tile: Box, warps: Mapping[str, Warp]) -> dict[str, Bytes]:
+    """Return what is on a tile of each layer that reaches it."""
+    found = {name: warp.tile(tile) for name, warp in warps.items()}
+    return {name: cells for name, cells in found.items() if cells is not None}
 
 
-def _tiles(rows: int, cols: int) -> Iterator[tuple[int, int, int, int]]:
-    for top in range(0, rows, _TILE_CELLS):
-        for left in range(0, cols, _TILE_CELLS):
-            yield top, left, min(rows, top + _TILE_CELLS), min(cols, left + _TILE_CELLS)
-
-
-def _tile(warp: _Warp, box: tuple[int, int, int, int]) -> Bytes | None:
-    """Return a layer's cells on a box of the canvas, or None if it does not reach there."""
-    top, left, bottom, right = box
-    if not (warp.box[0] < bottom and top < warp.box[2] and warp.box[1] < right and left < warp.box[3]):
-        return None
-    if warp.cells.size == 0:
-        return None
-    (a, b, x), (c, d, y) = warp.cell_from_canvas
-    across, up = np.arange(left, right) + 0.5, np.arange(top, bottom)[:, None] + 0.5
-    # from the canvas' own numbers, so that the outcome does not depend on where tiles begin
-    col, row = np.floor(a * across + x + b * up).astype(np.int32), np.floor(c * across + y + d * up).astype(np.int32)
-    rows, cols = warp.cells.shape
-    inside = (col >= 0) & (col < cols) & (row >= 0) & (row < rows)
-    if not inside.any():
-        return None
-    tile = np.full(inside.shape, _UNKNOWN_BYTE, np.uint8)
-    tile[inside] = warp.cells[row[inside], col[inside]]
-    return tile
-
-
-def _agreement(count: _Counts, cell_m2: float) -> Agreement:
-    smaller = min(count.known, count.others_known)
+def _agreement(count: _Counts, known: int, cell_m2: float) -> Agreement:
+    """Return how a layer agrees with the others, given how many cells any layer knows."""
+    others_known = known - count.known + count.overlap
+    smaller = min(count.known, others_known)
     return Agreement(
         acceptance=count.agree / (count.agree + count.disagree) if count.agree else 0.0,
         overlap_m2=count.overlap * cell_m2,

@@ -16,6 +16,7 @@ Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
 UNKNOWN = -1
+UNKNOWN_BYTE = 255
 MAX_PERCENT = 100
 MAX_SIDE_CELLS = 100_000
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError
-from mapmerge.fuse import Layer, fuse
+from mapmerge.fuse import fuse
 from mapmerge.graph import Edge, Forest, place
 from mapmerge.grid import Grid
 from mapmerge.match import Match, load_matcher
@@ -21,6 +21,7 @@ from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
 from mapmerge.unite import Unions, united
+from mapmerge.warp import Layer
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from mapmerge.config import MergeConfig
-from mapmerge.fuse import Agreement, Fusion, Layer
+from mapmerge.fuse import Agreement, Fusion
 from mapmerge.graph import Forest, Placement
 from mapmerge.match import Match
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import IDENTITY, Sim2
+from mapmerge.warp import Layer
 
 Pair = tuple[str, str]
 

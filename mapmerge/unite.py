@@ -14,13 +14,14 @@ from itertools import combinations
 from typing import Any
 
 from mapmerge.config import HIGHEST_CONFIDENCE, MergeConfig, VerifyConfig
-from mapmerge.fuse import Layer, fuse
+from mapmerge.fuse import fuse
 from mapmerge.graph import Forest
 from mapmerge.grid import Grid
 from mapmerge.match import Match, Matcher
 from mapmerge.outcome import Pair
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
+from mapmerge.warp import Layer
 
 Robots = tuple[str, ...]
 Placed = tuple[tuple[str, Sim2], ...]

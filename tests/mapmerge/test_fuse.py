@@ -8,9 +8,10 @@ import pytest
 
 from mapmerge import fuse as fuse_module
 from mapmerge.config import CellConfig
-from mapmerge.fuse import Layer, fuse
+from mapmerge.fuse import fuse
 from mapmerge.grid import Grid
 from mapmerge.sim2 import IDENTITY, Sim2
+from mapmerge.warp import Layer
 
 CELLS = CellConfig()
 

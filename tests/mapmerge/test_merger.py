@@ -8,7 +8,7 @@ import pytest
 
 from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError
-from mapmerge.fuse import Layer, fuse
+from mapmerge.fuse import fuse
 from mapmerge.grid import Grid
 from mapmerge.match import Match, Rival
 from mapmerge.merger import MergeState, step
@@ -16,6 +16,7 @@ from mapmerge.outcome import Change, ChangeKind, Status
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import IDENTITY, Sim2
+from mapmerge.warp import Layer
 from tests.floors import errors, filled, last_map, office_pair, office_run, pair_of, with_another_label
 
 ROBOTS = ("r1", "r2", "r3", "r4")

@@ -11,9 +11,10 @@ from hypothesis.extra import numpy as hnp
 
 from mapmerge import fuse as fuse_module
 from mapmerge.config import CellConfig
-from mapmerge.fuse import Layer, fuse
+from mapmerge.fuse import Canvas, fuse
 from mapmerge.grid import Grid
 from mapmerge.sim2 import IDENTITY, Sim2
+from mapmerge.warp import Layer
 
 CELLS = CellConfig()
 values = st.integers(-1, 100)
@@ -121,3 +122,48 @@ def test_copies_of_a_map_agree(grid, count):
     for agreement in fusion.agreements:
         assert agreement.acceptance == (1.0 if has_classed else 0.0)
         assert agreement.overlap_m2 == pytest.approx(grid.known_area_m2)
+
+
+@st.composite
+def histories(draw):
+    """Return layers by name at some times: maps that change in a part, grow, move, come and go."""
+    rng = np.random.default_rng(draw(st.integers(0, 10_000)))
+    poses = [IDENTITY, Sim2(0.31, -0.2, 0.4), Sim2(-1.0, 0.5, -2.0), Sim2(0.5, 0.25), Sim2(2.0, 0.0, 0.0, 1.3)]
+    resolutions = {name: draw(st.sampled_from([0.05, 0.05, 0.1, 0.025])) for name in "abc"}
+    cells = {name: rng.choice([-1, 0, 30, 100], (40, 50)).astype(np.int8) for name in "abc"}
+    corners = dict.fromkeys("abc", (0, 0))
+    placed = {name: draw(st.sampled_from(poses)) for name in "abc"}
+    grids = {}
+    times = []
+    for _ in range(draw(st.integers(1, 5))):
+        for name in sorted(draw(st.sets(st.sampled_from("abc"))) | (set() if grids else set("abc"))):
+            what = draw(st.sampled_from(["part", "grow", "move", "same"]))
+            if what == "part":
+                cells[name] = cells[name].copy()
+                cells[name][5:20, 7:30] = rng.choice([-1, 0, 80], (15, 23))
+            elif what == "grow":
+                margins = rng.integers(0, 6, (2, 2))
+                cells[name] = np.pad(cells[name], margins, constant_values=-1)
+                corners[name] = corners[name][0] + int(margins[0, 0]), corners[name][1] + int(margins[1, 0])
+                cells[name][:4] = rng.choice([-1, 0, 100], (4, cells[name].shape[1]))
+            elif what == "move":
+                placed[name] = draw(st.sampled_from(poses))
+            resolution_m = resolutions[name]
+            origin = Sim2(-corners[name][1] * resolution_m, -corners[name][0] * resolution_m)
+            grids[name] = Grid(cells[name].copy(), resolution_m, Sim2(yaw_rad=0.3) @ origin)
+        shown = draw(st.sets(st.sampled_from("abc"), min_size=1))
+        times.append({name: Layer(grids[name], placed[name]) for name in sorted(shown)})
+    return times, resolutions
+
+
+@given(histories())
+def test_a_canvas_that_is_kept_up_to_date_is_what_is_fused_anew(history):
+    times, resolutions = history
+    lattice = Grid(np.zeros((3, 3), np.int8), resolutions["a"], Sim2(0.02, 0.01))
+    canvas = Canvas(CELLS)
+    for layers in times:
+        kept, anew = canvas.update(layers, lattice), Canvas(CELLS).update(layers, lattice)
+        assert kept.agreements == anew.agreements
+        np.testing.assert_array_equal(kept.grid.cells, anew.grid.cells)
+        assert kept.grid.map_from_grid == anew.grid.map_from_grid
+        assert canvas.update(layers, lattice).grid is kept.grid
