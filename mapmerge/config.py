@@ -20,6 +20,7 @@ __all__ = [
     "ScaleChoice",
     "SearchConfig",
     "VerifyConfig",
+    "WatchConfig",
 ]
 
 ScaleChoice = Literal["metadata", "free"]
@@ -247,6 +248,40 @@ class VerifyConfig(Settings):
 
 
 @dataclass(frozen=True, slots=True)
+class WatchConfig(Settings):
+    """When placements are searched anew, instead of being followed from one update to the next.
+
+    Parameters
+    ----------
+    overlap_growth
+        A placement is searched anew once its maps share so many times as much as at the last search.
+    agreement_drop
+        Or once the share of the walls that agree has fallen by this.
+    likeness_rise
+        Or once the score of its best rival, as a share of its own, has risen by this.
+    area_growth
+        Maps without a placement are searched once one of them knows so many times as much as at the last search.
+    longest_wait
+        Or after 1, 2, 4, … updates, at most so many.
+    hold_cells
+        A placement is kept as it is as long as aligning it anew moves the walls by no more, root mean square.
+    jump_share
+        A map jumped if more than this share of its walls contradict what it was before.
+    least_kept_share
+        Or if it still knows less than this share of what it knew before.
+    """
+
+    overlap_growth: float = 1.5
+    agreement_drop: float = 0.05
+    likeness_rise: float = 0.1
+    area_growth: float = 1.1
+    longest_wait: int = 16
+    hold_cells: float = 0.5
+    jump_share: float = 0.2
+    least_kept_share: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
 class MergeConfig(Settings):
     """All settings of the merger.
 
@@ -271,6 +306,7 @@ class MergeConfig(Settings):
     refine: RefineConfig = field(default_factory=RefineConfig)
     slack: SlackConfig = field(default_factory=SlackConfig)
     verify: VerifyConfig = field(default_factory=VerifyConfig)
+    watch: WatchConfig = field(default_factory=WatchConfig)
     paper: PaperConfig = field(default_factory=PaperConfig)
     existing: ExistingConfig = field(default_factory=ExistingConfig)
     moved_m: float = 0.10

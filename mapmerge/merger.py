@@ -1,27 +1,31 @@
 """The incremental merger: one step for each timestamp at which maps changed.
 
-`MergeState` is the only state there is. It is a value: `step` returns the next one and leaves the old one as it was.
+A `Merger` owns all that is kept from one step to the next, and changes it in place; the results that it returns are
+values, which stay as they are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
 
 from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError
-from mapmerge.fuse import fuse
+from mapmerge.evidence import Evidence
+from mapmerge.fuse import Canvas
 from mapmerge.graph import Edge, Forest, place
 from mapmerge.grid import Grid
+from mapmerge.jump import difference
 from mapmerge.match import Match, load_matcher
-from mapmerge.outcome import Change, Pair, RobotOutcome, Status, changes_of, outcomes_of
+from mapmerge.outcome import Change, Looked, Pair, RobotOutcome, Status, changes_of, outcomes_of
+from mapmerge.pairs import Mapped, News, Pairs
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
 from mapmerge.unite import Unions, united
 from mapmerge.warp import Layer
+from mapmerge.watch import Trigger
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,148 +42,154 @@ class MergeResult:
         Latest match of each pair of robots with maps, target first.
     priors
         What was believed of each of these pairs when it was matched; pairs of which nothing was are left out.
+    searched
+        Which pairs were searched in this step, and why; the placements of the others were followed, or kept.
     merged
-        The fused map, in the merged frame, which is the reference's map frame; None until the reference has a map.
+        The fused map, in the merged frame, which is the reference's map frame; None until the reference has a map. The
+        very same grid as in the last result if none of its cells changed.
     updated
         Robots whose map changed in this step.
     changes
-        What was placed, moved or withdrawn in this step.
+        What jumped, or was placed, moved or withdrawn in this step.
     """
 
     robots: Mapping[str, RobotOutcome]
     grids: Mapping[str, Grid]
     pairs: Mapping[Pair, Match]
     priors: Mapping[Pair, Prior]
+    searched: Mapping[Pair, Trigger]
     merged: Grid | None
     updated: tuple[str, ...]
     changes: tuple[Change, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MergeState:
-    """What the merger carries from one step to the next.
+class Merger:
+    """Takes in robots' maps as they come, and says what is known then.
 
     Parameters
     ----------
-    result
-        The last result.
-    matches
-        What the matcher said of each pair, before placements that contradict each other are refused.
-    prepared
-        What the matcher computed for one map, the latest, at one resolution.
-    centres_m
-        Middle of what each map knows, in its map frame: where placements are compared.
-    reported
-        Placements as they were last reported in a change.
-    unions
-        What the matcher said of merged maps.
-    """
-
-    result: MergeResult
-    matches: Mapping[Pair, Match] = field(default_factory=dict)
-    prepared: Mapping[tuple[str, float], Any] = field(default_factory=dict)
-    centres_m: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    reported: Mapping[str, Sim2] = field(default_factory=dict)
-    unions: Unions = field(default_factory=Unions)
-
-    @staticmethod
-    def initial(robots: Sequence[str]) -> MergeState:
-        """Return the state before any map, for these robots; the first is the reference.
-
-        Raises
-        ------
-        ConfigError
-            If there is no robot, or one twice.
-        """
-        if not robots or len(set(robots)) != len(robots):
-            raise ConfigError(f"robots are {list(robots)}; expected at least one, each once")
-        waiting = Reason(ReasonCode.NO_MAP, "no map that shows anything yet")
-        outcomes = {robot: RobotOutcome(Status.NO_MAP, waiting) for robot in robots}
-        return MergeState(MergeResult(outcomes, {}, {}, {}, None, (), ()))
-
-
-def step(
-    state: MergeState,
-    updates: Mapping[str, Grid],
-    config: MergeConfig,
-    priors: Mapping[str, Prior] | None = None,
-) -> tuple[MergeState, MergeResult]:
-    """Take in new maps and return what is known then.
-
-    Maps that say what was known already cost nothing: pairs of unchanged maps are not matched again, unless what is
-    believed of them changed. A map in which nothing is known is no map.
-
-    Parameters
-    ----------
-    state
-        What the last step returned.
-    updates
-        New maps.
+    robots
+        The robots; the first is the reference.
     config
         Settings.
-    priors
-        Where robots' map frames are believed to lie in the reference's. Without a new map they change nothing.
+    mapped
+        How searches of several pairs are run: `map`, one after the other, or that of a pool of threads. The outcome is
+        the same.
 
     Raises
     ------
     ConfigError
-        If an update is of a robot that is not among those of the state.
+        If there is no robot, or one twice, or no such method.
     """
-    robots = tuple(state.result.robots)
-    strangers = sorted(set(updates) - set(robots))
-    if strangers:
-        raise ConfigError(f"there are maps of {', '.join(strangers)}; expected only maps of {', '.join(robots)}")
-    updated = tuple(robot for robot in robots if _is_new(updates.get(robot), state.result.grids.get(robot)))
-    if not updated:
-        result = replace(state.result, updated=(), changes=())
-        return replace(state, result=result), result
-    grids = {
-        robot: updates[robot] if robot in updated else state.result.grids[robot]
-        for robot in robots
-        if robot in updated or robot in state.result.grids
-    }
-    maps = {robot: grid for robot, grid in grids.items() if grid.known.any()}
-    believed = _pair_priors(robots[0], list(combinations(maps, 2)), priors or {}, state.result.priors)
-    alone, prepared = _matched(state, maps, updated, config, believed)
-    centres_m = {robot: maps[robot].middle_m if robot in updated else state.centres_m[robot] for robot in maps}
-    matches, forest, unions = _linked(state.unions.without(updated), maps, centres_m, alone, believed, config)
-    pairs = _without_contradicted(matches, forest)
-    layers = _layers(robots[0], maps, forest)
-    fusion = fuse(list(layers.values()), grids[robots[0]], config.cells) if layers else None
-    outcomes = outcomes_of(robots, pairs, forest, layers, fusion)
-    changes, reported = changes_of(robots[0], outcomes, state.reported, centres_m, config)
-    merged = fusion.grid if fusion else None
-    result = MergeResult(outcomes, grids, pairs, believed, merged, updated, changes)
-    return MergeState(result, alone, prepared, centres_m, reported, unions), result
+
+    def __init__(self, robots: Sequence[str], config: MergeConfig | None = None, mapped: Mapped = map) -> None:
+        if not robots or len(set(robots)) != len(robots):
+            raise ConfigError(f"robots are {list(robots)}; expected at least one, each once")
+        self._config = config or MergeConfig()
+        matcher = load_matcher(self._config.method)
+        self._maps: dict[str, Grid] = {}
+        self._known: dict[str, _Known] = {}
+        self._pairs = Pairs(matcher, self._config, mapped)
+        self._unions = Unions(matcher, self._config)
+        self._canvas = Canvas(self._config.cells)
+        self._reported: dict[str, Sim2] = {}
+        waiting = Reason(ReasonCode.NO_MAP, "no map that shows anything yet")
+        outcomes = {robot: RobotOutcome(Status.NO_MAP, waiting) for robot in robots}
+        self.result = MergeResult(outcomes, {}, {}, {}, {}, None, (), ())
+
+    def step(
+        self, updates: Mapping[str, Grid], priors: Mapping[str, Prior] | None = None, *, is_last: bool = False
+    ) -> MergeResult:
+        """Take in new maps and return what is known then.
+
+        Maps that say what was known already cost nothing. Placements are followed as maps grow, and searched anew when
+        that may tell more: `mapmerge.watch` says when. A map in which nothing is known is no map.
+
+        Parameters
+        ----------
+        updates
+            New maps.
+        priors
+            Where robots' map frames are believed to lie in the reference's. Without a new map they change nothing.
+        is_last
+            Whether these are the last maps: whatever was only followed since it was searched is searched once more, so
+            that the outcome is that of the last maps alone.
+
+        Raises
+        ------
+        ConfigError
+            If an update is of a robot that is not among those of the merger.
+        """
+        robots = tuple(self.result.robots)
+        strangers = sorted(set(updates) - set(robots))
+        if strangers:
+            raise ConfigError(f"there are maps of {', '.join(strangers)}; expected only maps of {', '.join(robots)}")
+        updated = tuple(robot for robot in robots if _is_new(updates.get(robot), self.result.grids.get(robot)))
+        if not updated and not is_last:
+            self.result = replace(self.result, updated=(), changes=(), searched={})
+            return self.result
+        jumped = self._take({robot: updates[robot] for robot in updated})
+        news = News(frozenset(updated), frozenset(jumped), robots[0], is_last)
+        believed = _pair_priors(robots[0], list(combinations(self._maps, 2)), priors or {}, self.result.priors)
+        areas_m2 = {robot: known.area_m2 for robot, known in self._known.items()}
+        searched = self._pairs.update(self._maps, areas_m2, believed, news)
+        self._unions.update(self._maps, news)
+        matches, forest = self._linked(believed)
+        pairs = _without_contradicted(matches, forest)
+        layers = _layers(robots[0], self._maps, forest)
+        grids = {robot: grid for robot in robots if (grid := updates.get(robot) or self.result.grids.get(robot))}
+        fusion = self._canvas.update(layers, grids[robots[0]]) if layers else None
+        outcomes = outcomes_of(robots, pairs, forest, layers, fusion)
+        centres_m = {robot: known.centre_m for robot, known in self._known.items()}
+        looked = Looked(searched, jumped, {robot: outcome.shown_pair for robot, outcome in self.result.robots.items()})
+        changes, self._reported = changes_of(outcomes, self._reported, centres_m, looked, self._config)
+        merged = fusion.grid if fusion else None
+        self.result = MergeResult(outcomes, grids, pairs, believed, searched, merged, updated, changes)
+        return self.result
+
+    def explain(self, pair: Pair) -> tuple[Evidence, ...]:
+        """Return what the matcher saw of a pair of maps, as they were at the last step; none of merged maps."""
+        return self._pairs.explain(pair, self._maps) if pair in self._pairs.matches else ()
+
+    def _take(self, updates: Mapping[str, Grid]) -> tuple[str, ...]:
+        """Take in maps that are new; return the robots whose map jumped."""
+        jumped = []
+        for robot, grid in updates.items():
+            known = grid.cropped_to_known()
+            before = self._maps.pop(robot, None)
+            if known.cells.size == 0:
+                self._known.pop(robot, None)
+                continue
+            self._maps[robot] = known
+            self._known[robot] = _Known(known.known_area_m2, known.middle_m)
+            if before is not None and difference(before, known, self._config).is_jump(self._config):
+                jumped.append(robot)
+        # in the order of the robots, whenever their maps came
+        self._maps = {robot: self._maps[robot] for robot in self.result.robots if robot in self._maps}
+        return tuple(jumped)
+
+    def _linked(self, believed: Mapping[Pair, Prior]) -> tuple[dict[Pair, Match], Forest]:
+        """Place robots by the matches of pairs, then those that only merged maps can place, one after the other."""
+        alone = self._pairs.matches
+        matches = dict(alone)
+        centres_m = {robot: self._known[robot].centre_m for robot in self._maps}
+        forest = _placed(centres_m, matches, self._config)
+        while found := united(forest, self._maps, alone, believed, self._unions, self._config):
+            matches[found[0]] = found[1]
+            forest = _placed(centres_m, matches, self._config)
+        return matches, forest
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """What a map knows: its area, and the middle of the rectangle around it in the map frame."""
+
+    area_m2: float
+    centre_m: tuple[float, float]
 
 
 def _is_new(update: Grid | None, known: Grid | None) -> bool:
     return update is not None and (known is None or not update.same_as(known))
-
-
-def _matched(
-    state: MergeState,
-    grids: Mapping[str, Grid],
-    updated: Sequence[str],
-    config: MergeConfig,
-    priors: Mapping[Pair, Prior],
-) -> tuple[dict[Pair, Match], dict[tuple[str, float], Any]]:
-    """Match every pair of which a map, or what is believed of it, changed; keep the matches of the others."""
-    matcher = load_matcher(config.method)
-    prepared = {key: value for key, value in state.prepared.items() if key[0] not in updated}
-    pairs: dict[Pair, Match] = {}
-    for pair in combinations(grids, 2):
-        believed_as_before = priors.get(pair) is state.result.priors.get(pair)
-        if pair in state.matches and believed_as_before and not set(pair) & set(updated):
-            pairs[pair] = state.matches[pair]
-            continue
-        resolution_m = max(config.search.working_cell_m, *(grids[robot].resolution_m for robot in pair))
-        for robot in pair:
-            if (robot, resolution_m) not in prepared:
-                prepared[robot, resolution_m] = matcher.prepare(grids[robot], resolution_m, config)
-        target, source = (prepared[robot, resolution_m] for robot in pair)
-        pairs[pair] = matcher.match(target, source, config, priors.get(pair))
-    return pairs, prepared
 
 
 def _pair_priors(
@@ -200,26 +210,6 @@ def _prior_of(pair: Pair, reference: str, priors: Mapping[str, Prior]) -> Prior 
     if source not in priors or (target != reference and target not in priors):
         return None
     return priors[source] if target == reference else priors[target].inverse().compose(priors[source])
-
-
-def _linked(
-    unions: Unions,
-    maps: Mapping[str, Grid],
-    centres_m: Mapping[str, tuple[float, float]],
-    alone: Mapping[Pair, Match],
-    believed: Mapping[Pair, Prior],
-    config: MergeConfig,
-) -> tuple[dict[Pair, Match], Forest, Unions]:
-    """Place robots by the matches of pairs, then those that only merged maps can place, one after the other."""
-    matcher = load_matcher(config.method)
-    matches = dict(alone)
-    forest = _placed(centres_m, matches, config)
-    while True:
-        found, unions = united(forest, maps, alone, believed, unions, matcher, config)
-        if found is None:
-            return matches, forest, unions
-        matches[found[0]] = found[1]
-        forest = _placed(centres_m, matches, config)
 
 
 def _placed(centres_m: Mapping[str, tuple[float, float]], pairs: Mapping[Pair, Match], config: MergeConfig) -> Forest:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -13,6 +13,7 @@ from mapmerge.match import Match
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import IDENTITY, Sim2
 from mapmerge.warp import Layer
+from mapmerge.watch import Trigger
 
 Pair = tuple[str, str]
 
@@ -27,20 +28,50 @@ class Status(StrEnum):
 
 
 class ChangeKind(StrEnum):
-    """How a robot's placement changed."""
+    """How a robot's map or its placement changed."""
 
     PLACED = "placed"
     MOVED = "moved"
     WITHDRAWN = "withdrawn"
+    JUMPED = "jumped"
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A robot's map was placed, moved or withdrawn."""
+    """A robot's map jumped, or was placed, moved or withdrawn.
+
+    Parameters
+    ----------
+    reason
+        What is known of its placement now.
+    trigger
+        Why the pair was searched that placed it or, if it is withdrawn, that did so before; None if it was not, as when
+        a placement is followed or hangs on that of another robot.
+    """
 
     robot: str
     kind: ChangeKind
     reason: Reason
+    trigger: Trigger | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Looked:
+    """What was done in a step.
+
+    Parameters
+    ----------
+    searched
+        Which pairs were searched, and why.
+    jumped
+        Robots whose map jumped.
+    shown_before
+        The pair that each robot was judged by before.
+    """
+
+    searched: Mapping[Pair, Trigger]
+    jumped: Collection[str]
+    shown_before: Mapping[str, Pair | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,10 +218,10 @@ def _best_refused(reference: str, robot: str, pairs: Mapping[Pair, Match]) -> Pa
 
 
 def changes_of(
-    reference: str,
     outcomes: Mapping[str, RobotOutcome],
     reported: Mapping[str, Sim2],
     centres_m: Mapping[str, tuple[float, float]],
+    looked: Looked,
     config: MergeConfig,
 ) -> tuple[tuple[Change, ...], dict[str, Sim2]]:
     """Compare the placements with those reported last.
@@ -198,23 +229,32 @@ def changes_of(
     Returns
     -------
     changes, reported
-        What was placed, moved or withdrawn, and the placements as they are reported now.
+        What jumped, or was placed, moved or withdrawn, and the placements as they are reported now.
     """
     changes: list[Change] = []
     now: dict[str, Sim2] = {}
     for robot, outcome in outcomes.items():
+        if robot in looked.jumped:
+            changes.append(Change(robot, ChangeKind.JUMPED, outcome.reason))
         pose, before = outcome.merged_from_map, reported.get(robot)
-        if robot == reference:
+        if outcome.status is Status.REFERENCE:
             continue
         if pose is None:
             if before is not None:
-                changes.append(Change(robot, ChangeKind.WITHDRAWN, outcome.reason))
+                trigger = _trigger(looked, looked.shown_before.get(robot), outcome.shown_pair)
+                changes.append(Change(robot, ChangeKind.WITHDRAWN, outcome.reason, trigger))
             continue
         now[robot] = pose
+        trigger = _trigger(looked, outcome.shown_pair)
         if before is None:
-            changes.append(Change(robot, ChangeKind.PLACED, outcome.reason))
+            changes.append(Change(robot, ChangeKind.PLACED, outcome.reason, trigger))
         elif pose.is_close(before, distance_m=config.moved_m, angle_rad=config.moved_rad, at_m=centres_m[robot]):
             now[robot] = before
         else:
-            changes.append(Change(robot, ChangeKind.MOVED, outcome.reason))
+            changes.append(Change(robot, ChangeKind.MOVED, outcome.reason, trigger))
     return tuple(changes), now
+
+
+def _trigger(looked: Looked, *pairs: Pair | None) -> Trigger | None:
+    """Return why the first of some pairs that was searched was."""
+    return next((looked.searched[pair] for pair in pairs if pair in looked.searched), None)

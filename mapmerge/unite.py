@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
@@ -19,9 +19,11 @@ from mapmerge.graph import Forest
 from mapmerge.grid import Grid
 from mapmerge.match import Match, Matcher
 from mapmerge.outcome import Pair
+from mapmerge.pairs import News
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
 from mapmerge.warp import Layer
+from mapmerge.watch import Watch
 
 Robots = tuple[str, ...]
 Placed = tuple[tuple[str, Sim2], ...]
@@ -30,16 +32,77 @@ _UNCONTESTED = {ReasonCode.LOW_CONFIDENCE, ReasonCode.WALLS_DISAGREE}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _Union:
+    """What the matcher said of two merged maps, and where their maps lay then."""
+
+    match: Match
+    places: tuple[Placed, Placed]
+    watch: Watch
+
+
 class Unions:
-    """Matches of merged maps, by the robots of both and where these lie, for as long as none of their maps changes."""
+    """Matches of merged maps, kept until their maps have grown, moved, or changed often enough.
 
-    matches: Mapping[tuple[Placed, Placed], Match] = field(default_factory=dict)
+    Parameters
+    ----------
+    matcher, config
+        The method and its settings.
+    """
 
-    def without(self, updated: Sequence[str]) -> Unions:
-        """Return the matches that are of none of these robots."""
-        gone = set(updated)
-        return Unions(
-            {key: match for key, match in self.matches.items() if not gone & {robot for robot, _ in sum(key, ())}}
+    def __init__(self, matcher: Matcher[Any], config: MergeConfig) -> None:
+        self._matcher, self._config = matcher, config
+        self._known: dict[tuple[Robots, Robots], _Union] = {}
+        self._fresh: set[tuple[Robots, Robots]] = set()
+        self._is_last = False
+
+    @property
+    def matches(self) -> dict[tuple[Robots, Robots], Match]:
+        """The matches, by the robots of both merged maps."""
+        return {key: union.match for key, union in self._known.items()}
+
+    def update(self, maps: Collection[str], news: News) -> None:
+        """Take in what changed, before matches are asked for."""
+        self._fresh.clear()
+        for key, union in list(self._known.items()):
+            robots = set(sum(key, ()))
+            if not robots <= set(maps) or robots & news.jumped:
+                del self._known[key]
+            elif robots & news.updated:
+                self._known[key] = replace(union, watch=union.watch.updated())
+        self._is_last = news.is_last
+
+    def match(self, key: tuple[Robots, Robots], forest: Forest, grids: Mapping[str, Grid]) -> Match:
+        """Return what the matcher says of two merged maps; it is asked only if it may say something else now."""
+        places = _places(key[0], forest), _places(key[1], forest)
+        areas_m2 = sum(grids[name].known_area_m2 for name in key[0]), sum(grids[name].known_area_m2 for name in key[1])
+        union = self._known.get(key)
+        if union is None or (key not in self._fresh and self._is_due(union, places, areas_m2, grids)):
+            target, source = (_merged(robots, forest, grids, self._config) for robots in key)
+            match = _matched(target, source, self._matcher, self._config)
+            watch = Watch.of(match, areas_m2, union.watch if union else None, self._config.watch)
+            union = self._known[key] = _Union(match, places, watch)
+        self._fresh.add(key)
+        return union.match
+
+    def _is_due(
+        self,
+        union: _Union,
+        places: tuple[Placed, Placed],
+        areas_m2: tuple[float, float],
+        grids: Mapping[str, Grid],
+    ) -> bool:
+        if self._is_last and union.watch.waited:
+            return True
+        if any(self._moved(was, now, grids) for was, now in zip(union.places, places, strict=True)):
+            return True
+        return union.watch.is_retry_due(areas_m2, self._config.watch)
+
+    def _moved(self, was: Placed, now: Placed, grids: Mapping[str, Grid]) -> bool:
+        """Tell whether a robot's place in its component is another one."""
+        limits = self._config
+        return any(
+            not pose.is_close(before, distance_m=limits.moved_m, angle_rad=limits.moved_rad, at_m=grids[robot].middle_m)
+            for (robot, pose), (_, before) in zip(now, was, strict=True)
         )
 
 
@@ -57,10 +120,9 @@ def united(
     matches: Mapping[Pair, Match],
     believed: Collection[Pair],
     unions: Unions,
-    matcher: Matcher[Any],
     config: MergeConfig,
-) -> tuple[tuple[Pair, Match] | None, Unions]:
-    """Return the surest match that several maps agree on, or that merged maps give, and all of these that were tried.
+) -> tuple[Pair, Match] | None:
+    """Return the surest match that several maps agree on, or that merged maps give; None if there is none.
 
     Merged maps are tried only where one of them has several robots, some pair of robots was not hopeless, and nothing
     is believed beforehand. Their match is between the robots in whose frames they are.
@@ -76,11 +138,10 @@ def united(
     believed
         Pairs of which something is believed beforehand.
     unions
-        What was tried before.
-    matcher, config
-        The method and its settings.
+        What merged maps say.
+    config
+        Settings.
     """
-    tried = dict(unions.matches)
     groups = components(forest)
     best: tuple[Pair, Match] | None = None
     for one, two in combinations(groups, 2):
@@ -90,16 +151,10 @@ def united(
             continue
         found = agreed(between, forest, grids, matches, config)
         if found is None and _is_hopeful(between, matches, config):
-            places = _places(key[0], forest), _places(key[1], forest)
-            if places not in tried:
-                target, source = (_merged(robots, forest, grids, config) for robots in key)
-                match = _matched(target, source, matcher, config)
-                # the maps of a refused one need not be kept
-                tried[places] = match if match.accepted else replace(match, evidence=())
-            found = (one, two), _named(tried[places], key)
+            found = (one, two), _named(unions.match(key, forest, grids), key)
         if found and found[1].accepted and (best is None or _surety(found[1]) > _surety(best[1])):
             best = found
-    return best, Unions(tried)
+    return best
 
 
 def agreed(

@@ -64,7 +64,7 @@ class Match:
         Distinct placements of the same pair: the likeliest first, but those that share too little last; by their score
         where the method does not tell how likely they are.
     evidence
-        What each step of the matcher saw, in order.
+        What each step of the matcher saw, in order, if it cannot be told afterwards: see `Matcher.explain`.
     """
 
     target_from_source: Sim2 | None
@@ -88,7 +88,8 @@ class Match:
 class Matcher(Protocol[PreparedT]):
     """A method that finds where one map lies on another.
 
-    A matcher has no state: what it computes for one map alone is returned by `prepare` and kept by the caller.
+    A matcher has no state: what it computes for one map alone is returned by `prepare` and kept by the caller. One that
+    can neither keep that up to date nor follow a placement inherits what is here.
     """
 
     def prepare(self, grid: Grid, resolution_m: float, config: MergeConfig) -> PreparedT:
@@ -101,3 +102,27 @@ class Matcher(Protocol[PreparedT]):
         With a prior only placements within it are accepted.
         """
         ...
+
+    def update(self, prepared: PreparedT, grid: Grid, resolution_m: float, config: MergeConfig) -> PreparedT:
+        """Return what `prepare` or this returned for a map, brought up to date; what is given is used up."""
+        del prepared
+        return self.prepare(grid, resolution_m, config)
+
+    def renewed(self, prepared: PreparedT) -> PreparedT:
+        """Return what `prepare` would return for the map, up to rounding; what is given is used up."""
+        return prepared
+
+    def follow(
+        self, target: PreparedT, source: PreparedT, known: Match, config: MergeConfig, prior: Prior | None = None
+    ) -> Match | None:
+        """Return how a placement that was accepted fits the maps as they are now; None if this cannot tell.
+
+        It is cheap, looks nowhere else, and may find that the placement must be refused.
+        """
+        del target, source, known, config, prior
+        return None
+
+    def explain(self, target: PreparedT, source: PreparedT, match: Match, config: MergeConfig) -> tuple[Evidence, ...]:
+        """Return what each step saw of a match of these maps, in order, for pictures of it."""
+        del target, source, config
+        return match.evidence
