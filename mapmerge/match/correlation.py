@@ -14,23 +14,21 @@ The smaller map is always the one that is moved, so that swapping the maps gives
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
 from mapmerge.align import Poses, placement_of, poses_of
 from mapmerge.config import MergeConfig
-from mapmerge.evidence import Curve, CurvesEvidence, Evidence, OverlayEvidence, SurfaceEvidence
 from mapmerge.grid import Grid
 from mapmerge.match.base import Match, Rival
 from mapmerge.match.candidates import all_scales, by_half_turn, by_prior, by_spectra, by_sweep, likely_rotations
 from mapmerge.match.confidence import confidence, times_as_likely
 from mapmerge.match.cues import Cues, Fit
+from mapmerge.match.explain import explained
 from mapmerge.match.look import Look, beside, look, rivals
 from mapmerge.match.pair import DescribedMap, PairOfMaps
-from mapmerge.match.spectrum import orientation_spectra, spectrum_correlation
-from mapmerge.match.surface import TranslationSearch
+from mapmerge.match.spectrum import orientation_spectra
 from mapmerge.match.verdict import contradicted, is_far_likelier, judge, too_little_structure, within
 from mapmerge.match.weigh import Weighed, weighed
 from mapmerge.polish import polish
@@ -86,14 +84,14 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
     ranked = _search(pair, rotations, config)
     if len(ranked.poses) == 0:
         reason = Reason(ReasonCode.NO_CANDIDATE, "no placement lets walls of the two maps coincide")
-        return Match(None, None, accepted=False, reason=reason, evidence=(_spectra(pair, rotations),))
+        return _with_evidence(pair, Match(None, None, accepted=False, reason=reason), config)
     found = _weighed(pair, ranked, config)
     best = _polished(pair, placement_of(found.look.poses[0]), config)
     scores = verify(pair.target.map, pair.source.map, best, config.verify)
     cues = Cues(found.fits[0], found.contest)
     sure = confidence(cues.contest, config.tries)
     reason = judge(scores, cues, sure, config.verify, found.other_half(config.verify))
-    return Match(
+    match = Match(
         target_from_source=pair.between_maps(best),
         scores=scores,
         accepted=reason.code is ReasonCode.ACCEPTED,
@@ -101,12 +99,12 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
         confidence=sure,
         cues=cues,
         rivals=_rivals(pair, found),
-        evidence=(
-            _spectra(pair, rotations),
-            _surface(pair, best, found.look, config),
-            _overlay(pair, best, config),
-        ),
     )
+    return _with_evidence(pair, match, config)
+
+
+def _with_evidence(pair: PairOfMaps, match: Match, config: MergeConfig) -> Match:
+    return replace(match, evidence=explained(pair, match, config))
 
 
 def _rivals(pair: PairOfMaps, found: Weighed) -> tuple[Rival, ...]:
@@ -195,75 +193,10 @@ def _is_clear(ranked: Look, config: MergeConfig) -> bool:
 
 
 def _inverted(match: Match) -> Match:
-    """Return the match of the same maps, swapped."""
+    """Return the match of the same maps, swapped; evidence is of the maps as they were given already."""
     pose = match.target_from_source
     return replace(
         match,
         target_from_source=pose.inverse() if pose else None,
         rivals=tuple(replace(rival, target_from_source=rival.target_from_source.inverse()) for rival in match.rivals),
-        evidence=tuple(_swapped_evidence(item) for item in match.evidence),
-    )
-
-
-def _swapped_evidence(item: Evidence) -> Evidence:
-    if isinstance(item, OverlayEvidence):
-        back = item.target_from_source.inverse()
-        return replace(item, target=item.source, source=item.target, target_from_source=back)
-    if isinstance(item, CurvesEvidence):
-        names = {"target": "source", "source": "target"}
-        return replace(
-            item, curves=tuple(replace(curve, label=names.get(curve.label, curve.label)) for curve in item.curves)
-        )
-    return item
-
-
-def _spectra(pair: PairOfMaps, rotations: tuple[float, ...]) -> CurvesEvidence:
-    target, source = pair.target.spectra[0], pair.source.spectra[0]
-    return CurvesEvidence(
-        step="orientation_spectra",
-        title="Orientation spectra and their correlation",
-        axis="angle [°]",
-        start=0.0,
-        stop=180.0,
-        curves=(
-            Curve("target", target),
-            Curve("source", source),
-            Curve("correlation", spectrum_correlation(target, source)),
-        ),
-        marks=tuple(math.degrees(angle) for angle in rotations),
-    )
-
-
-def _surface(pair: PairOfMaps, best: Sim2, weighed_ones: Look, config: MergeConfig) -> Evidence:
-    """Return the surface at the rotation of the best placement, with all placements of about this rotation."""
-    search = config.search
-    turn = Sim2(0.0, 0.0, best.yaw_rad, best.scale)
-    translations = TranslationSearch(
-        pair.target.map,
-        pair.source.map,
-        search.cell_m,
-        search.max_side_cells,
-        search.free_weights[-1:],
-        max(1.0, turn.scale),
-    )
-    surface = translations.surfaces(turn)[0]
-    others = weighed_ones.poses[1:]
-    same_turn = np.abs(np.remainder(others[:, 2] - turn.yaw_rad + np.pi, 2 * np.pi) - np.pi) < 0.1
-    return SurfaceEvidence(
-        step="correlation_surface",
-        title=f"Correlation of walls and free space, one map turned by {math.degrees(turn.yaw_rad):.1f}°",
-        values=surface.values,
-        marks=tuple(surface.index(placement_of(pose)) for pose in others[same_turn]),
-        chosen=surface.index(best),
-    )
-
-
-def _overlay(pair: PairOfMaps, best: Sim2, config: MergeConfig) -> Evidence:
-    return OverlayEvidence(
-        step="overlay",
-        title="Walls that agree are green, walls in the other map's free space red",
-        target=pair.target.map,
-        source=pair.source.map,
-        target_from_source=best,
-        tolerance_m=config.verify.tolerance_m,
     )
