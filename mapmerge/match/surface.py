@@ -153,13 +153,15 @@ def surface_peaks(surface: CorrelationSurface, peak_distance_m: float) -> tuple[
     """
     reach = max(1, round(peak_distance_m / surface.step_m))
     highest = cv2.dilate(surface.values, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
-    rows, cols = np.nonzero((surface.values >= highest) & (surface.values > 0))
-    order = np.argsort(-surface.values[rows, cols], kind="stable")
-    rows, cols = rows[order], cols[order]
+    # flat: of two dimensions it takes ten times as long to find a few among many
+    found = np.flatnonzero((surface.values >= highest) & (surface.values > 0))
+    values = surface.values.ravel()[found]
+    order = np.argsort(-values, kind="stable")
+    rows, cols = np.divmod(found[order], surface.values.shape[1])
     poses = np.empty((len(rows), 4))
     poses[:, 0], poses[:, 1] = surface.shift_m(rows, cols)
     poses[:, 2:] = surface.turn.yaw_rad, surface.turn.scale
-    return poses, surface.values[rows, cols]
+    return poses, values[order]
 
 
 def _correlated(target: tuple[Surface, Surface], walls: Surface, free: Surface, conjugate: bool) -> Surface:
