@@ -16,6 +16,8 @@ from mapmerge.config import RefineConfig
 from mapmerge.prepare import CELL_OCCUPIED, PreparedMap
 from mapmerge.sim2 import Points, Sim2
 
+Floats = NDArray[np.float32]
+
 _CONVERGED_M = 2e-4
 _CONVERGED_RAD = 2e-5
 _MIN_PAIRS = 12
@@ -50,29 +52,37 @@ def _blurred_step(target: PreparedMap, points_m: Points, blur_cells: float) -> S
 
     Each point counts as much as there are walls around it, so that the pulls of two equal maps cancel out exactly.
     """
-    reach = math.ceil(3.0 * blur_cells)
-    around = np.arange(-reach, reach + 1)
-    rows, cols = target.classes.shape
-    place = points_m / target.resolution_m + target.margin
-    cell = np.floor(place).astype(np.intp)
-    row, col = cell[:, 1, None] + around, cell[:, 0, None] + around
-    kernel_y = np.exp(-0.5 * np.square((row + 0.5 - place[:, 1, None]) / blur_cells))
-    kernel_x = np.exp(-0.5 * np.square((col + 0.5 - place[:, 0, None]) / blur_cells))
-    inside = ((row >= 0) & (row < rows))[:, :, None] & ((col >= 0) & (col < cols))[:, None, :]
-    index = np.clip(row, 0, rows - 1)[:, :, None] * cols + np.clip(col, 0, cols - 1)[:, None, :]
-    walls = (target.classes.ravel()[index] == CELL_OCCUPIED) & inside
-    pull = walls * kernel_y[:, :, None] * kernel_x[:, None, :]
-    weight = pull.sum(axis=(1, 2))
-    drawn = weight > 0
-    if int(np.count_nonzero(drawn)) < _MIN_PAIRS:
+    place = points_m.T / target.resolution_m + target.margin
+    weight, pull_x, pull_y = _pulls(target, place, blur_cells)
+    drawn = np.flatnonzero(weight > 0)
+    if len(drawn) < _MIN_PAIRS:
         return None
-    pull, weight, place = pull[drawn], weight[drawn], place[drawn]
-    error: Points = np.empty_like(place)
-    error[:, 0] = (pull * (col[drawn] + 0.5)[:, None, :]).sum(axis=(1, 2)) / weight - place[:, 0]
-    error[:, 1] = (pull * (row[drawn] + 0.5)[:, :, None]).sum(axis=(1, 2)) / weight - place[:, 1]
-    points = points_m[drawn]
+    weight, points = weight[drawn].astype(np.float64), points_m[drawn]
+    error = np.stack([pull_x[drawn], pull_y[drawn]], axis=1) / weight[:, None]
     centre = points.mean(axis=0)
     return _rigid_motion(points - centre, error * target.resolution_m, weight, centre)
+
+
+def _pulls(target: PreparedMap, place: Points, blur_cells: float) -> tuple[Floats, Floats, Floats]:
+    """Return how much wall is around each place, in cells, shape (2, N), and the sums of the ways to it in x and y."""
+    reach = math.ceil(3.0 * blur_cells)
+    rows, cols = target.classes.shape
+    # a window that would leave the map lies in its margin instead, where there is no wall
+    largest = np.array([[cols - 1 - reach], [rows - 1 - reach]])
+    cell = np.clip(np.floor(place), reach, largest).astype(np.intp)
+    around = np.arange(-reach, reach + 1)
+    # shapes (2R + 1, N): the way from the place to the middles of the window's columns and rows
+    way_x, way_y = ((cell - place)[:, None] + (around + 0.5)[:, None]).astype(np.float32)
+    near_x, near_y = (np.exp(np.square(way) * np.float32(-0.5 / blur_cells**2)) for way in (way_x, way_y))
+    window = (around[:, None] * cols + around)[:, :, None] + (cell[1] * cols + cell[0])
+    walls = (target.classes.ravel().take(window) == CELL_OCCUPIED).astype(np.float32)
+    # sums over the columns of each row of the window, then over its rows
+    in_rows, along_rows = (walls * near_x).sum(axis=1), (walls * (near_x * way_x)).sum(axis=1)
+    return (
+        np.asarray((in_rows * near_y).sum(axis=0), np.float32),
+        np.asarray((along_rows * near_y).sum(axis=0), np.float32),
+        np.asarray((in_rows * (near_y * way_y)).sum(axis=0), np.float32),
+    )
 
 
 def _is_still(step: Sim2) -> bool:
@@ -82,11 +92,11 @@ def _is_still(step: Sim2) -> bool:
 def _rigid_motion(arms: Points, error: Points, weight: NDArray[np.float64], centre: Points) -> Sim2:
     """Return the motion about ``centre`` that best moves the points by their errors (weighted, closed form)."""
     total = weight.sum()
-    mean_arm = (weight[:, None] * arms).sum(axis=0) / total
-    mean_error = (weight[:, None] * error).sum(axis=0) / total
+    mean_arm = weight @ arms / total
+    mean_error = weight @ error / total
     before, after = arms - mean_arm, arms + error - (mean_arm + mean_error)
-    cross = float((weight * (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])).sum())
-    dot = float((weight * (before * after).sum(axis=1)).sum())
+    cross = float(weight @ (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]))
+    dot = float(weight @ (before[:, 0] * after[:, 0] + before[:, 1] * after[:, 1]))
     yaw_rad = math.atan2(cross, dot)
     turned = Sim2(yaw_rad=yaw_rad)
     pivot = centre + mean_arm
