@@ -64,7 +64,7 @@ def _surface(pair: PairOfMaps, best: Sim2, rivals: list[Sim2], config: SearchCon
         config.cell_m,
         config.max_side_cells,
         config.free_weights[-1:],
-        max(1.0, turn.scale),
+        [turn],
     )
     surface = translations.surfaces(turn)[0]
     return SurfaceEvidence(
