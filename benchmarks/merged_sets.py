@@ -11,7 +11,7 @@ from benchmarks.published import MapSet, Names
 from benchmarks.verdicts import Error, Tolerance, Verdict, error_of, verdict
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
-from mapmerge.merger import MergeState, step
+from mapmerge.merger import Merger
 from mapmerge.sim2 import Sim2
 from samples.mission import known_at
 
@@ -101,7 +101,7 @@ def pair_outcomes(maps: MapSet, method: str) -> list[PairOutcome]:
 
 def set_outcome(maps: MapSet, method: str) -> SetOutcome:
     """Merge all maps of a set together."""
-    _, result = step(MergeState.initial(list(maps.grids)), maps.grids, MergeConfig(method=method))
+    result = Merger(list(maps.grids), MergeConfig(method=method)).step(maps.grids)
     placements = {robot: outcome.placement for robot, outcome in result.robots.items() if outcome.placement}
     components: dict[str, list[str]] = {}
     for robot, placement in placements.items():

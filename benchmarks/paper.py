@@ -31,7 +31,7 @@ from benchmarks.paper_cases import (
 from benchmarks.paper_noise import sweep
 from benchmarks.paper_pictures import write_global_map, write_pictures
 from mapmerge.config import MergeConfig, PaperConfig, RansacConfig
-from mapmerge.merger import MergeResult, MergeState, step
+from mapmerge.merger import Merger, MergeResult
 
 METHODS = ("existing", "paper", "correlation")
 _LITERAL = PaperConfig(turn_tolerance_rad=0.0, max_models=1, ransac=RansacConfig(in_both=False))
@@ -98,7 +98,7 @@ def print_three(folder: Path, cases: list[Case], method: str, suffix: str) -> Me
     """Print where three maps of scenario 2 are placed in one frame; y1 on y2 directly would be a false merge."""
     names = [f"scenario2_{name}{suffix}" for name in ("y3", "y1", "y2")]
     grids = {name: load_map(folder, name) for name in names}
-    _, result = step(MergeState.initial(names), grids, MergeConfig(method=method))
+    result = Merger(names, MergeConfig(method=method)).step(grids)
     words = []
     for name in names[1:]:
         case = next(case for case in cases if case.target_name == names[0] and case.source_name == name)

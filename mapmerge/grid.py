@@ -116,12 +116,16 @@ class Grid:
 
     def cropped_to_known(self) -> Grid:
         """Return the smallest part of this grid that holds all its known cells; 0 × 0 if there is none."""
-        known = self.known
-        rows = np.flatnonzero(known.any(axis=1))
-        cols = np.flatnonzero(known.any(axis=0))
+        if self.cells.size and all(edge.max() >= 0 for edge in self._edges()):
+            return self
+        rows = np.flatnonzero(self.cells.max(axis=1, initial=UNKNOWN) >= 0)
+        cols = np.flatnonzero(self.cells.max(axis=0, initial=UNKNOWN) >= 0)
         if rows.size == 0:
             return Grid(self.cells[:0, :0], self.resolution_m, self.map_from_grid)
         row, col = int(rows[0]), int(cols[0])
         corner = Sim2(col * self.resolution_m, row * self.resolution_m)
         cells = self.cells[row : int(rows[-1]) + 1, col : int(cols[-1]) + 1]
         return Grid(cells, self.resolution_m, self.map_from_grid @ corner)
+
+    def _edges(self) -> tuple[Cells, ...]:
+        return self.cells[0], self.cells[-1], self.cells[:, 0], self.cells[:, -1]

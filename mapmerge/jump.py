@@ -71,11 +71,11 @@ class _Totals:
 def _compared(old: Cells, new: Cells, totals: _Totals, config: MergeConfig, resolution_m: float) -> Difference:
     """Compare cells of both maps, outside of which both say the same."""
     limits, tolerance_cells = config.cells, max(1.0, config.verify.tolerance_m / resolution_m)
-    walls = old >= limits.min_occupied_percent, new >= limits.min_occupied_percent
+    old_walls, new_walls = old >= limits.min_occupied_percent, new >= limits.min_occupied_percent
     contradicted = 0
-    for here, there, cells in ((*walls, new), (*reversed(walls), old)):
-        free = (cells >= 0) & (cells <= limits.max_free_percent)
-        contradicted += int(np.count_nonzero(here & free & _far(there, tolerance_cells)))
+    for walls, others, other in ((old_walls, new_walls, new), (new_walls, old_walls, old)):
+        free = (other >= 0) & (other <= limits.max_free_percent)
+        contradicted += int(np.count_nonzero(walls & free & _far(others, tolerance_cells)))
     forgotten = int(np.count_nonzero((old >= 0) & (new < 0)))
     return Difference(
         contradicted_share=contradicted / 2 / totals.walls if totals.walls else 0.0,

@@ -91,6 +91,7 @@ class Merger:
         self._known: dict[str, _Known] = {}
         self._pairs = Pairs(matcher, self._config, mapped)
         self._unions = Unions(matcher, self._config)
+        self._of_merged_maps: set[Pair] = set()
         self._canvas = Canvas(self._config.cells)
         self._reported: dict[str, Sim2] = {}
         waiting = Reason(ReasonCode.NO_MAP, "no map that shows anything yet")
@@ -137,7 +138,8 @@ class Merger:
         matches, forest = self._linked(believed)
         pairs = _without_contradicted(matches, forest)
         layers = _layers(robots[0], self._maps, forest)
-        grids = {robot: grid for robot in robots if (grid := updates.get(robot) or self.result.grids.get(robot))}
+        latest = {**self.result.grids, **{robot: updates[robot] for robot in updated}}
+        grids = {robot: latest[robot] for robot in robots if robot in latest}
         fusion = self._canvas.update(layers, grids[robots[0]]) if layers else None
         outcomes = outcomes_of(robots, pairs, forest, layers, fusion)
         centres_m = {robot: known.centre_m for robot, known in self._known.items()}
@@ -147,9 +149,16 @@ class Merger:
         self.result = MergeResult(outcomes, grids, pairs, believed, searched, merged, updated, changes)
         return self.result
 
+    @property
+    def unions(self) -> Mapping[tuple[tuple[str, ...], tuple[str, ...]], Match]:
+        """What the matcher said of merged maps, by the robots of both."""
+        return self._unions.matches
+
     def explain(self, pair: Pair) -> tuple[Evidence, ...]:
-        """Return what the matcher saw of a pair of maps, as they were at the last step; none of merged maps."""
-        return self._pairs.explain(pair, self._maps) if pair in self._pairs.matches else ()
+        """Return what the matcher saw of a pair of maps, or of those that were merged for it, as of the last step."""
+        if pair in self._of_merged_maps:
+            return self._unions.explain(pair, self._maps)
+        return self._pairs.explain(pair, self._maps)
 
     def _take(self, updates: Mapping[str, Grid]) -> tuple[str, ...]:
         """Take in maps that are new; return the robots whose map jumped."""
@@ -174,8 +183,11 @@ class Merger:
         matches = dict(alone)
         centres_m = {robot: self._known[robot].centre_m for robot in self._maps}
         forest = _placed(centres_m, matches, self._config)
-        while found := united(forest, self._maps, alone, believed, self._unions, self._config):
-            matches[found[0]] = found[1]
+        self._of_merged_maps.clear()
+        while link := united(forest, self._maps, alone, believed, self._unions, self._config):
+            matches[link.pair] = link.match
+            if link.is_of_merged_maps:
+                self._of_merged_maps.add(link.pair)
             forest = _placed(centres_m, matches, self._config)
         return matches, forest
 

@@ -257,4 +257,4 @@ def changes_of(
 
 def _trigger(looked: Looked, *pairs: Pair | None) -> Trigger | None:
     """Return why the first of some pairs that was searched was."""
-    return next((looked.searched[pair] for pair in pairs if pair in looked.searched), None)
+    return next((looked.searched[pair] for pair in pairs if pair is not None and pair in looked.searched), None)

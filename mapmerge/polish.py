@@ -1,12 +1,16 @@
 """Alignment of a placement to a fraction of a cell.
 
 ICP cannot tell where in a cell it ends. `polish` can: it maximises the correlation of both maps' walls, each blurred by
-about a cell, which is smooth and treats the two maps alike.
+about a cell, which is smooth and treats the two maps alike. Each step alone goes a part of the way, the smaller the
+thicker the walls are; so where it would end is extrapolated from how the last ones shrank (Anderson acceleration: D. G.
+Anderson, *Iterative procedures for nonlinear integral equations*, 1965).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +18,17 @@ from numpy.typing import NDArray
 from mapmerge.align import evenly
 from mapmerge.config import RefineConfig
 from mapmerge.prepared import CELL_OCCUPIED, PreparedMap
-from mapmerge.sim2 import Points, Sim2
+from mapmerge.sim2 import Points, Sim2, wrap_angle
+
+Floats = NDArray[np.float32]
+Vector = NDArray[np.float64]
 
 _CONVERGED_M = 2e-4
 _CONVERGED_RAD = 2e-5
 _MIN_PAIRS = 12
+_REMEMBERED = 2
+_MOST_STEPS_AT_ONCE = 10.0
+_SAME_CHANGE = 1e-3
 
 
 def polish(target: PreparedMap, wall_cells_m: Points, start: Sim2, config: RefineConfig) -> Sim2:
@@ -34,15 +44,71 @@ def polish(target: PreparedMap, wall_cells_m: Points, start: Sim2, config: Refin
         ``target_from_source`` that ICP returned; its scale is kept.
     """
     cells_m = evenly(wall_cells_m, config.max_polish_points)
-    pose = start
+    if len(cells_m) == 0:
+        return start
+    frame = _Frame.about(cells_m, start)
+    pose = end = start
+    tried: list[Vector] = []
+    steps: list[Vector] = []
     for _ in range(config.iterations):
         step = _blurred_step(target, pose.apply(cells_m), config.blur_cells)
         if step is None:
-            return pose
-        pose = step @ pose
+            break
+        end = step @ pose
         if _is_still(step):
             break
-    return pose
+        tried.append(frame.vector(pose))
+        steps.append(frame.vector(end) - tried[-1])
+        pose = frame.placement(_extrapolated(tried[-_REMEMBERED - 1 :], steps[-_REMEMBERED - 1 :]))
+    return end
+
+
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    """Placements near one of them as vectors: where it moves the middle of the points, and the points about it.
+
+    Parameters
+    ----------
+    start
+        The placement whose vector is 0.
+    middle_m
+        Middle of the points, in the source's frame.
+    arm_m
+        How far the points are from it: a turn counts as much as it moves them.
+    """
+
+    start: Sim2
+    middle_m: tuple[float, float]
+    arm_m: float
+
+    @classmethod
+    def about(cls, points_m: Points, start: Sim2) -> _Frame:
+        x_m, y_m = points_m.mean(axis=0).tolist()
+        square = np.square(points_m - (x_m, y_m)).sum(axis=1).mean()
+        return cls(start, (x_m, y_m), max(math.sqrt(square), _CONVERGED_M))
+
+    def vector(self, placement: Sim2) -> Vector:
+        from_m, to_m = self.start.apply_point(*self.middle_m), placement.apply_point(*self.middle_m)
+        turn_rad = wrap_angle(placement.yaw_rad - self.start.yaw_rad)
+        return np.array([to_m[0] - from_m[0], to_m[1] - from_m[1], turn_rad * self.arm_m])
+
+    def placement(self, vector: Vector) -> Sim2:
+        x_m, y_m, turned_m = vector.tolist()
+        turn = Sim2(yaw_rad=self.start.yaw_rad + turned_m / self.arm_m, scale=self.start.scale)
+        from_m, turned = self.start.apply_point(*self.middle_m), turn.apply_point(*self.middle_m)
+        return Sim2(from_m[0] + x_m - turned[0], from_m[1] + y_m - turned[1], turn.yaw_rad, turn.scale)
+
+
+def _extrapolated(tried: Sequence[Vector], steps: Sequence[Vector]) -> Vector:
+    """Return where steps would end if they went on to change as they did, or after the last step if it is the first."""
+    last, step = tried[-1], steps[-1]
+    if len(steps) == 1:
+        return last + step
+    moves, changes = np.diff(tried, axis=0).T, np.diff(steps, axis=0).T
+    share = np.linalg.lstsq(changes, step, rcond=_SAME_CHANGE)[0]
+    way = step - (moves + changes) @ share
+    length, most = float(np.linalg.norm(way)), _MOST_STEPS_AT_ONCE * float(np.linalg.norm(step))
+    return last + way * min(1.0, most / max(length, 1e-12))
 
 
 def _blurred_step(target: PreparedMap, points_m: Points, blur_cells: float) -> Sim2 | None:
@@ -50,29 +116,37 @@ def _blurred_step(target: PreparedMap, points_m: Points, blur_cells: float) -> S
 
     Each point counts as much as there are walls around it, so that the pulls of two equal maps cancel out exactly.
     """
-    reach = math.ceil(3.0 * blur_cells)
-    around = np.arange(-reach, reach + 1)
-    rows, cols = target.classes.shape
-    place = points_m / target.resolution_m + target.margin
-    cell = np.floor(place).astype(np.intp)
-    row, col = cell[:, 1, None] + around, cell[:, 0, None] + around
-    kernel_y = np.exp(-0.5 * np.square((row + 0.5 - place[:, 1, None]) / blur_cells))
-    kernel_x = np.exp(-0.5 * np.square((col + 0.5 - place[:, 0, None]) / blur_cells))
-    inside = ((row >= 0) & (row < rows))[:, :, None] & ((col >= 0) & (col < cols))[:, None, :]
-    index = np.clip(row, 0, rows - 1)[:, :, None] * cols + np.clip(col, 0, cols - 1)[:, None, :]
-    walls = (target.classes.ravel()[index] == CELL_OCCUPIED) & inside
-    pull = walls * kernel_y[:, :, None] * kernel_x[:, None, :]
-    weight = pull.sum(axis=(1, 2))
-    drawn = weight > 0
-    if int(np.count_nonzero(drawn)) < _MIN_PAIRS:
+    place = points_m.T / target.resolution_m + target.margin
+    weight, pull_x, pull_y = _pulls(target, place, blur_cells)
+    drawn = np.flatnonzero(weight > 0)
+    if len(drawn) < _MIN_PAIRS:
         return None
-    pull, weight, place = pull[drawn], weight[drawn], place[drawn]
-    error: Points = np.empty_like(place)
-    error[:, 0] = (pull * (col[drawn] + 0.5)[:, None, :]).sum(axis=(1, 2)) / weight - place[:, 0]
-    error[:, 1] = (pull * (row[drawn] + 0.5)[:, :, None]).sum(axis=(1, 2)) / weight - place[:, 1]
-    points = points_m[drawn]
+    wall, points = weight[drawn].astype(np.float64), points_m[drawn]
+    error = np.stack([pull_x[drawn], pull_y[drawn]], axis=1) / wall[:, None]
     centre = points.mean(axis=0)
-    return _rigid_motion(points - centre, error * target.resolution_m, weight, centre)
+    return _rigid_motion(points - centre, error * target.resolution_m, wall, centre)
+
+
+def _pulls(target: PreparedMap, place: Points, blur_cells: float) -> tuple[Floats, Floats, Floats]:
+    """Return how much wall is around each place, in cells, shape (2, N), and the sums of the ways to it in x and y."""
+    reach = math.ceil(3.0 * blur_cells)
+    rows, cols = target.classes.shape
+    # a window that would leave the map lies in its margin instead, where there is no wall
+    largest = np.array([[cols - 1 - reach], [rows - 1 - reach]])
+    cell = np.clip(np.floor(place), reach, largest).astype(np.intp)
+    around = np.arange(-reach, reach + 1)
+    # shapes (2R + 1, N): the way from the place to the middles of the window's columns and rows
+    way_x, way_y = ((cell - place)[:, None] + (around + 0.5)[:, None]).astype(np.float32)
+    near_x, near_y = (np.exp(np.square(way) * np.float32(-0.5 / blur_cells**2)) for way in (way_x, way_y))
+    window = (around[:, None] * cols + around)[:, :, None] + (cell[1] * cols + cell[0])
+    walls = (target.classes.ravel().take(window) == CELL_OCCUPIED).astype(np.float32)
+    # sums over the columns of each row of the window, then over its rows
+    in_rows, along_rows = (walls * near_x).sum(axis=1), (walls * (near_x * way_x)).sum(axis=1)
+    return (
+        np.asarray((in_rows * near_y).sum(axis=0), np.float32),
+        np.asarray((along_rows * near_y).sum(axis=0), np.float32),
+        np.asarray((in_rows * (near_y * way_y)).sum(axis=0), np.float32),
+    )
 
 
 def _is_still(step: Sim2) -> bool:
@@ -82,11 +156,11 @@ def _is_still(step: Sim2) -> bool:
 def _rigid_motion(arms: Points, error: Points, weight: NDArray[np.float64], centre: Points) -> Sim2:
     """Return the motion about ``centre`` that best moves the points by their errors (weighted, closed form)."""
     total = weight.sum()
-    mean_arm = (weight[:, None] * arms).sum(axis=0) / total
-    mean_error = (weight[:, None] * error).sum(axis=0) / total
+    mean_arm = weight @ arms / total
+    mean_error = weight @ error / total
     before, after = arms - mean_arm, arms + error - (mean_arm + mean_error)
-    cross = float((weight * (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])).sum())
-    dot = float((weight * (before * after).sum(axis=1)).sum())
+    cross = float(weight @ (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]))
+    dot = float(weight @ (before[:, 0] * after[:, 0] + before[:, 1] * after[:, 1]))
     yaw_rad = math.atan2(cross, dot)
     turned = Sim2(yaw_rad=yaw_rad)
     pivot = centre + mean_arm

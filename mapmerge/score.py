@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -112,7 +113,7 @@ def agreement(target: PreparedMap, source: PreparedMap, poses: Poses, ahead: Pro
     return Agreement(
         tally(_met(target, poses, ahead.walls_m), ahead.wall_m * poses[:, 3]),
         tally(_met(source, inverse, back.walls_m), back.wall_m),
-        np.count_nonzero(_met(target, poses, ahead.free_m) & MEETS_FREE, axis=1) * ahead.free_m2 * poses[:, 3] ** 2,
+        _count(_met(target, poses, ahead.free_m), MEETS_FREE, MEETS_FREE) * ahead.free_m2 * poses[:, 3] ** 2,
     )
 
 
@@ -129,20 +130,29 @@ def _met(prepared: PreparedMap, poses: Poses, points_m: Points) -> NDArray[np.ui
 def _looked_up(prepared: PreparedMap, x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.uint8]:
     rows, cols = prepared.meets.shape
     inverse, margin = np.float32(1.0 / prepared.resolution_m), np.float32(prepared.margin)
-    col = np.clip(x * inverse + margin, 0, cols - 1).astype(np.int32)
-    row = np.clip(y * inverse + margin, 0, rows - 1).astype(np.int32)
-    found: NDArray[np.uint8] = prepared.meets.ravel()[row * cols + col]
-    return found
+    col, row = x * inverse + margin, y * inverse + margin
+    cell = np.clip(row, 0, rows - 1, out=row).astype(np.int32)
+    cell *= np.int32(cols)
+    cell += np.clip(col, 0, cols - 1, out=col).astype(np.int32)
+    return prepared.meets.ravel().take(cell)
 
 
 def tally(met: NDArray[np.uint8], wall_m: float | Lengths) -> Tally:
     """Return what walls met, of `PreparedMap.meets` at each, shape (C, N), each for so much wall."""
 
     def length_m(mask: int, value: int) -> Lengths:
-        return np.asarray(np.count_nonzero((met & mask) == value, axis=1) * wall_m, np.float64)
+        return np.asarray(_count(met, mask, value) * wall_m, np.float64)
 
     return Tally(
         matched_m=length_m(MEETS_WALL, MEETS_WALL),
         near_m=length_m(MEETS_FREE | MEETS_NEAR | MEETS_WALL, MEETS_FREE | MEETS_NEAR),
         far_m=length_m(MEETS_FREE | MEETS_NEAR | MEETS_WALL, MEETS_FREE),
     )
+
+
+def _count(met: NDArray[np.uint8], mask: int, value: int) -> NDArray[np.int32]:
+    """Return how many in each row of `PreparedMap.meets`, shape (C, N), have this value in the bits of the mask."""
+    if met.size == 0:
+        return np.zeros(len(met), np.int32)
+    found = ((met & np.uint8(mask)) == np.uint8(value)).view(np.uint8)
+    return np.asarray(cv2.reduce(found, 1, cv2.REDUCE_SUM, dtype=cv2.CV_32S), np.int32).ravel()

@@ -14,6 +14,7 @@ from itertools import combinations
 from typing import Any
 
 from mapmerge.config import HIGHEST_CONFIDENCE, MergeConfig, VerifyConfig
+from mapmerge.evidence import Evidence
 from mapmerge.fuse import fuse
 from mapmerge.graph import Forest
 from mapmerge.grid import Grid
@@ -77,12 +78,25 @@ class Unions:
         areas_m2 = sum(grids[name].known_area_m2 for name in key[0]), sum(grids[name].known_area_m2 for name in key[1])
         union = self._known.get(key)
         if union is None or (key not in self._fresh and self._is_due(union, places, areas_m2, grids)):
-            target, source = (_merged(robots, forest, grids, self._config) for robots in key)
-            match = _matched(target, source, self._matcher, self._config)
+            target, source = self._prepared(places, grids)
+            match = self._matcher.match(target, source, self._config)
             watch = Watch.of(match, areas_m2, union.watch if union else None, self._config.watch)
             union = self._known[key] = _Union(match, places, watch)
         self._fresh.add(key)
         return union.match
+
+    def explain(self, pair: Pair, grids: Mapping[str, Grid]) -> tuple[Evidence, ...]:
+        """Return what the matcher saw of the merged maps in the frames of two robots."""
+        for key, union in self._known.items():
+            if (key[0][0], key[1][0]) == pair:
+                target, source = self._prepared(union.places, grids)
+                return self._matcher.explain(target, source, union.match, self._config)
+        return ()
+
+    def _prepared(self, places: tuple[Placed, Placed], grids: Mapping[str, Grid]) -> list[Any]:
+        merged = [_merged(placed, grids, self._config) for placed in places]
+        resolution_m = max(self._config.search.working_cell_m, *(grid.resolution_m for grid in merged))
+        return [self._matcher.prepare(grid, resolution_m, self._config) for grid in merged]
 
     def _is_due(
         self,
@@ -106,6 +120,15 @@ class Unions:
         )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Link:
+    """A match between two robots that others' maps made possible: merged ones, or those that agree with it."""
+
+    pair: Pair
+    match: Match
+    is_of_merged_maps: bool
+
+
 def components(forest: Forest) -> dict[str, Robots]:
     """Return the robots that are linked with each other, by the robot in whose map frame they are placed."""
     found: dict[str, list[str]] = {}
@@ -121,7 +144,7 @@ def united(
     believed: Collection[Pair],
     unions: Unions,
     config: MergeConfig,
-) -> tuple[Pair, Match] | None:
+) -> Link | None:
     """Return the surest match that several maps agree on, or that merged maps give; None if there is none.
 
     Merged maps are tried only where one of them has several robots, some pair of robots was not hopeless, and nothing
@@ -143,16 +166,17 @@ def united(
         Settings.
     """
     groups = components(forest)
-    best: tuple[Pair, Match] | None = None
+    best: Link | None = None
     for one, two in combinations(groups, 2):
         key = groups[one], groups[two]
         between = [pair for pair in matches if set(pair) & set(key[0]) and set(pair) & set(key[1])]
         if max(map(len, key)) < 2 or set(between) & set(believed):
             continue
-        found = agreed(between, forest, grids, matches, config)
+        witnessed = agreed(between, forest, grids, matches, config)
+        found = Link(*witnessed, is_of_merged_maps=False) if witnessed else None
         if found is None and _is_hopeful(between, matches, config):
-            found = (one, two), _named(unions.match(key, forest, grids), key)
-        if found and found[1].accepted and (best is None or _surety(found[1]) > _surety(best[1])):
+            found = Link((one, two), _named(unions.match(key, forest, grids), key), is_of_merged_maps=True)
+        if found and found.match.accepted and (best is None or _surety(found.match) > _surety(best.match)):
             best = found
     return best
 
@@ -241,28 +265,20 @@ def _places(robots: Robots, forest: Forest) -> Placed:
     return tuple((robot, forest.placements[robot].component_from_map) for robot in robots)
 
 
-def _merged(robots: Robots, forest: Forest, grids: Mapping[str, Grid], config: MergeConfig) -> Grid:
+def _merged(placed: Placed, grids: Mapping[str, Grid], config: MergeConfig) -> Grid:
     """Return the merged map of linked robots, in the map frame of the first, on the cells of the one that knows most.
 
     So the cells, and what is found with them, do not depend on the order of the robots.
     """
-    if len(robots) == 1:
-        return grids[robots[0]]
-    base = max(robots, key=lambda robot: (grids[robot].known_area_m2, robot))
-    component_from_base = forest.placements[base].component_from_map
+    if len(placed) == 1:
+        return grids[placed[0][0]]
+    component_from = dict(placed)
+    base = max(component_from, key=lambda robot: (grids[robot].known_area_m2, robot))
+    component_from_base = component_from[base]
     base_from_component = component_from_base.inverse()
-    layers = [
-        Layer(grids[robot], base_from_component @ forest.placements[robot].component_from_map)
-        for robot in sorted(robots)
-    ]
+    layers = [Layer(grids[robot], base_from_component @ component_from[robot]) for robot in sorted(component_from)]
     merged = fuse(layers, grids[base], config.cells).grid
     return Grid(merged.cells, merged.resolution_m, component_from_base @ merged.map_from_grid)
-
-
-def _matched(target: Grid, source: Grid, matcher: Matcher[Any], config: MergeConfig) -> Match:
-    resolution_m = max(config.search.working_cell_m, target.resolution_m, source.resolution_m)
-    prepared = [matcher.prepare(grid, resolution_m, config) for grid in (target, source)]
-    return matcher.match(prepared[0], prepared[1], config)
 
 
 def _surety(match: Match) -> tuple[float, float]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from mapmerge.match import Match
+from collections.abc import Callable, Iterable
+
+from mapmerge.evidence import Evidence
 from mapmerge.merger import MergeResult
+from mapmerge.outcome import Pair
 from mapmerge.render import render
 from replay.events import RobotPicture
 from replay.options import ImageChoice
@@ -15,12 +18,15 @@ class Gallery:
     Parameters
     ----------
     choice
-        ``changed``: when the match is a new one; ``all``: at each tick; ``none``: never.
+        ``changed``: when a robot's pair was searched, or is another one; ``all``: at each tick; ``none``: never.
+    explain
+        Returns what the matcher saw of a pair.
     """
 
-    def __init__(self, choice: ImageChoice) -> None:
+    def __init__(self, choice: ImageChoice, explain: Callable[[Pair], Iterable[Evidence]]) -> None:
         self._choice = choice
-        self._shown: dict[str, Match] = {}
+        self._explain = explain
+        self._shown: dict[str, Pair] = {}
 
     def due(self, result: MergeResult) -> tuple[RobotPicture, ...]:
         """Return the images for this tick, robot by robot, step by step."""
@@ -28,10 +34,10 @@ class Gallery:
             return ()
         pictures: list[RobotPicture] = []
         for robot, outcome in result.robots.items():
-            if outcome.shown_pair is None:
+            pair = outcome.shown_pair
+            if pair is None:
                 continue
-            match = result.pairs[outcome.shown_pair]
-            if self._choice == "all" or self._shown.get(robot) is not match:
-                self._shown[robot] = match
-                pictures.extend(RobotPicture(robot, render(evidence)) for evidence in match.evidence)
+            if self._choice == "all" or pair in result.searched or self._shown.get(robot) != pair:
+                self._shown[robot] = pair
+                pictures.extend(RobotPicture(robot, render(evidence)) for evidence in self._explain(pair))
         return tuple(pictures)

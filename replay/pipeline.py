@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from time import perf_counter
 
 from mapmerge.errors import MapMergeError
-from mapmerge.merger import MergeState, step
+from mapmerge.merger import Merger
 from replay import __version__
 from replay.arrivals import Tally
 from replay.beliefs import Beliefs
@@ -24,12 +24,12 @@ def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
     """Replay what was planned and yield what happens."""
     settings = options.settings()
     report = ReportBuilder(plan.robots, settings, __version__)
-    gallery = Gallery(options.images)
     beliefs = Beliefs(plan.map_frames, options.init_poses, plan.recordings_with_transforms())
     feeds = (*plan.feeds, *(plan.transform_feeds or ()))
     tallies = tuple(Tally() for _ in feeds)
     inputs = plan.describe_inputs()
-    state = MergeState.initial([item.robot for item in plan.robots])
+    merger = Merger([item.robot for item in plan.robots], options.merge)
+    gallery = Gallery(options.images, merger.explain)
     done, total, stamp_ns = 0, sum(item.message_count for item in plan.robots), None
 
     yield Started(plan.robots, settings, inputs)
@@ -46,7 +46,7 @@ def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
         yield from _noted(report, notes)
         begin = perf_counter()
         try:
-            state, result = step(state, tick.grids, options.merge, priors)
+            result = merger.step(tick.grids, priors, is_last=tick.is_last)
         except MapMergeError as error:
             raise InputError(f"the maps of {', '.join(tick.grids)} at {tick.stamp_ns} ns: {error}") from error
         merged = perf_counter()
@@ -56,7 +56,7 @@ def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
         done, stamp_ns = done + tick.messages, tick.stamp_ns
         yield Merged(stamp_ns, result, report.build(stamp_ns, result, inputs), pictures, timing, done, total)
     yield from _noted(report, beliefs.missed())
-    yield Finished(report.build(stamp_ns, state.result, plan.describe_inputs(tallies)))
+    yield Finished(report.build(stamp_ns, merger.result, plan.describe_inputs(tallies)))
 
 
 def _noted(report: ReportBuilder, notes: Iterable[Noted]) -> Iterator[Noted]:

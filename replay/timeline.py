@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 from mapmerge.grid import Grid
@@ -15,14 +15,25 @@ from replay.events import SkipCause, Skipped
 from replay.messages import FrameLink, TransformMessage
 from replay.sources.base import Source
 
+_MOST_HELD = 1000
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tick:
-    """All maps of one time; ``messages`` were read since the tick before."""
+    """All maps of one time.
+
+    Parameters
+    ----------
+    messages
+        How many were read since the tick before.
+    is_last
+        Whether no other tick comes after it.
+    """
 
     stamp_ns: int
     grids: Mapping[str, Grid]
     messages: int
+    is_last: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +50,9 @@ def ticks(
 ) -> Iterator[Tick | Skipped | Transforms]:
     """Yield what the recordings say, in order of time; of one time, transforms before the tick.
 
+    The last tick says that it is the last, so that one is held back until the next one is read. If too much else comes
+    between, it is not: then a tick without maps ends the run.
+
     Parameters
     ----------
     feeds, tallies
@@ -51,6 +65,27 @@ def ticks(
     InputError
         If a recording cannot be read or, with ``strict``, a message cannot be used.
     """
+    last: Tick | None = None
+    held: list[Tick | Skipped | Transforms] = []
+    for item in _items(feeds, tallies, window, strict=strict):
+        if isinstance(item, Tick) or len(held) >= _MOST_HELD:
+            yield from held
+            held.clear()
+        if isinstance(item, Tick):
+            last = item
+        held.append(item)
+    if last is None:
+        yield from held
+    elif last in held:
+        yield from (replace(item, is_last=True) if item is last else item for item in held)
+    else:
+        yield from held
+        yield Tick(last.stamp_ns, {}, 0, is_last=True)
+
+
+def _items(
+    feeds: Sequence[Feed], tallies: Sequence[Tally], window: Window, *, strict: bool
+) -> Iterator[Tick | Skipped | Transforms]:
     streams = [in_order(feed, tally, window) for feed, tally in zip(feeds, tallies, strict=True)]
     latest: dict[str, Grid] = {}
     messages = 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
 
 from mapmerge.config import MergeConfig
@@ -83,6 +83,17 @@ class Match:
         if self.weight is not None:
             return self.weight
         return self.scores.score_m if self.scores is not None else 0.0
+
+    def inverse(self) -> Match:
+        """Return the match of the same maps, swapped; its evidence must be told afterwards."""
+        pose = self.target_from_source
+        return replace(
+            self,
+            target_from_source=None if pose is None else pose.inverse(),
+            rivals=tuple(
+                replace(rival, target_from_source=rival.target_from_source.inverse()) for rival in self.rivals
+            ),
+        )
 
 
 class Matcher(Protocol[PreparedT]):

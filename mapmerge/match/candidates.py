@@ -93,8 +93,7 @@ def _correlated(
     most: int,
     config: SearchConfig,
 ) -> Poses:
-    largest = max((turn.scale for turn in turns), default=1.0)
-    search = TranslationSearch(pair.target.map, pair.source.map, cell_m, config.max_side_cells, free_weights, largest)
+    search = TranslationSearch(pair.target.map, pair.source.map, cell_m, config.max_side_cells, free_weights, turns)
     found: list[list[tuple[Poses, NDArray[np.float32]]]] = [[] for _ in free_weights]
     for turn in turns:
         for number, surface in enumerate(search.surfaces(turn)):

@@ -14,27 +14,26 @@ The smaller map is always the one that is moved, so that swapping the maps gives
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
 from mapmerge.align import Poses, placement_of, poses_of
 from mapmerge.config import MergeConfig
-from mapmerge.evidence import Curve, CurvesEvidence, Evidence, OverlayEvidence, SurfaceEvidence
+from mapmerge.evidence import Evidence
 from mapmerge.grid import Grid
-from mapmerge.match.base import Match, Rival
+from mapmerge.match.base import Match, Matcher, Rival
 from mapmerge.match.candidates import all_scales, by_half_turn, by_prior, by_spectra, by_sweep, likely_rotations
 from mapmerge.match.confidence import confidence, times_as_likely
 from mapmerge.match.cues import Cues, Fit
+from mapmerge.match.explain import explained
+from mapmerge.match.follow import followed
 from mapmerge.match.look import Look, beside, look, rivals
-from mapmerge.match.pair import DescribedMap, PairOfMaps
-from mapmerge.match.spectrum import orientation_spectra, spectrum_correlation
-from mapmerge.match.surface import TranslationSearch
+from mapmerge.match.pair import DescribedMap, PairOfMaps, ordered
 from mapmerge.match.verdict import contradicted, is_far_likelier, judge, too_little_structure, within
 from mapmerge.match.weigh import Weighed, weighed
 from mapmerge.polish import polish
-from mapmerge.prepare import prepare
+from mapmerge.prepare import LiveMap
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
@@ -43,14 +42,23 @@ from mapmerge.verify import verify
 _ROUNDS = 4
 
 
-class CorrelationMatcher:
+class CorrelationMatcher(Matcher[DescribedMap]):
     """Finds a placement; the resolutions are taken from the maps' metadata unless the scale is free."""
 
     def prepare(self, grid: Grid, resolution_m: float, config: MergeConfig) -> DescribedMap:
         """Return the walls, distances and orientation spectra of one map."""
-        prepared = prepare(grid, resolution_m, config)
-        spectra = orientation_spectra(prepared.walls_m, config.search.angle_step_rad, prepared.wall_spacing_m)
-        return DescribedMap(prepared, spectra)
+        live = LiveMap(resolution_m, config)
+        return DescribedMap(live, live.update(grid), config.search.angle_step_rad)
+
+    def update(self, prepared: DescribedMap, grid: Grid, resolution_m: float, config: MergeConfig) -> DescribedMap:
+        """Return the map as it is now; only what changed is computed anew."""
+        del resolution_m, config
+        return replace(prepared, map=prepared.live.update(grid))
+
+    def renewed(self, prepared: DescribedMap) -> DescribedMap:
+        """Return the map with its walls thinned as if it were new."""
+        anew = prepared.live.renewed()
+        return prepared if anew is None else replace(prepared, map=anew)
 
     def match(
         self, target: DescribedMap, source: DescribedMap, config: MergeConfig, prior: Prior | None = None
@@ -59,13 +67,34 @@ class CorrelationMatcher:
         poor = too_little_structure(target, source, config.verify)
         if poor is not None:
             return Match(None, None, accepted=False, reason=poor)
-        swapped = target.comes_before(source)
-        first, second = (source, target) if swapped else (target, source)
-        pair = PairOfMaps(first, second, prior, swapped)
+        pair = ordered(target, source, prior)
         match = _matched(pair, config)
         if prior is not None:
-            match = _held_against(match, _matched(PairOfMaps(first, second, swapped=swapped), config), pair, config)
-        return _inverted(match) if swapped else match
+            elsewhere = replace(pair, prior=None)
+            match = _held_against(match, _matched(elsewhere, config), pair, config)
+        return match.inverse() if pair.swapped else match
+
+    def follow(
+        self, target: DescribedMap, source: DescribedMap, known: Match, config: MergeConfig, prior: Prior | None = None
+    ) -> Match:
+        """Return how a placement that was accepted fits the maps as they are now: aligned from there, and verified."""
+        pair = ordered(target, source, prior)
+        if not pair.swapped:
+            return followed(pair, known, config)
+        turned = known.inverse()
+        found = followed(pair, turned, config)
+        is_kept = found.target_from_source == turned.target_from_source
+        # to the bit, which inverting twice is not
+        return replace(found.inverse(), target_from_source=known.target_from_source) if is_kept else found.inverse()
+
+    def explain(
+        self, target: DescribedMap, source: DescribedMap, match: Match, config: MergeConfig
+    ) -> tuple[Evidence, ...]:
+        """Return the orientation spectra, the correlation of the coarse maps, and both maps laid on each other."""
+        if too_little_structure(target, source, config.verify) is not None:
+            return ()
+        pair = ordered(target, source)
+        return explained(pair, match.inverse() if pair.swapped else match, config)
 
 
 def _held_against(match: Match, elsewhere: Match, pair: PairOfMaps, config: MergeConfig) -> Match:
@@ -86,7 +115,7 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
     ranked = _search(pair, rotations, config)
     if len(ranked.poses) == 0:
         reason = Reason(ReasonCode.NO_CANDIDATE, "no placement lets walls of the two maps coincide")
-        return Match(None, None, accepted=False, reason=reason, evidence=(_spectra(pair, rotations),))
+        return Match(None, None, accepted=False, reason=reason)
     found = _weighed(pair, ranked, config)
     best = _polished(pair, placement_of(found.look.poses[0]), config)
     scores = verify(pair.target.map, pair.source.map, best, config.verify)
@@ -101,11 +130,6 @@ def _matched(pair: PairOfMaps, config: MergeConfig) -> Match:
         confidence=sure,
         cues=cues,
         rivals=_rivals(pair, found),
-        evidence=(
-            _spectra(pair, rotations),
-            _surface(pair, best, found.look, config),
-            _overlay(pair, best, config),
-        ),
     )
 
 
@@ -191,79 +215,4 @@ def _is_clear(ranked: Look, config: MergeConfig) -> bool:
         ranked.shares[0] >= limits.clear_agreement
         and ranked.matched_m[0] >= limits.clear_wall_m
         and ranked.scores_m[1:].max(initial=0.0) <= limits.clear_likeness * ranked.scores_m[0]
-    )
-
-
-def _inverted(match: Match) -> Match:
-    """Return the match of the same maps, swapped."""
-    pose = match.target_from_source
-    return replace(
-        match,
-        target_from_source=pose.inverse() if pose else None,
-        rivals=tuple(replace(rival, target_from_source=rival.target_from_source.inverse()) for rival in match.rivals),
-        evidence=tuple(_swapped_evidence(item) for item in match.evidence),
-    )
-
-
-def _swapped_evidence(item: Evidence) -> Evidence:
-    if isinstance(item, OverlayEvidence):
-        back = item.target_from_source.inverse()
-        return replace(item, target=item.source, source=item.target, target_from_source=back)
-    if isinstance(item, CurvesEvidence):
-        names = {"target": "source", "source": "target"}
-        return replace(
-            item, curves=tuple(replace(curve, label=names.get(curve.label, curve.label)) for curve in item.curves)
-        )
-    return item
-
-
-def _spectra(pair: PairOfMaps, rotations: tuple[float, ...]) -> CurvesEvidence:
-    target, source = pair.target.spectra[0], pair.source.spectra[0]
-    return CurvesEvidence(
-        step="orientation_spectra",
-        title="Orientation spectra and their correlation",
-        axis="angle [°]",
-        start=0.0,
-        stop=180.0,
-        curves=(
-            Curve("target", target),
-            Curve("source", source),
-            Curve("correlation", spectrum_correlation(target, source)),
-        ),
-        marks=tuple(math.degrees(angle) for angle in rotations),
-    )
-
-
-def _surface(pair: PairOfMaps, best: Sim2, weighed_ones: Look, config: MergeConfig) -> Evidence:
-    """Return the surface at the rotation of the best placement, with all placements of about this rotation."""
-    search = config.search
-    turn = Sim2(0.0, 0.0, best.yaw_rad, best.scale)
-    translations = TranslationSearch(
-        pair.target.map,
-        pair.source.map,
-        search.cell_m,
-        search.max_side_cells,
-        search.free_weights[-1:],
-        max(1.0, turn.scale),
-    )
-    surface = translations.surfaces(turn)[0]
-    others = weighed_ones.poses[1:]
-    same_turn = np.abs(np.remainder(others[:, 2] - turn.yaw_rad + np.pi, 2 * np.pi) - np.pi) < 0.1
-    return SurfaceEvidence(
-        step="correlation_surface",
-        title=f"Correlation of walls and free space, one map turned by {math.degrees(turn.yaw_rad):.1f}°",
-        values=surface.values,
-        marks=tuple(surface.index(placement_of(pose)) for pose in others[same_turn]),
-        chosen=surface.index(best),
-    )
-
-
-def _overlay(pair: PairOfMaps, best: Sim2, config: MergeConfig) -> Evidence:
-    return OverlayEvidence(
-        step="overlay",
-        title="Walls that agree are green, walls in the other map's free space red",
-        target=pair.target.map,
-        source=pair.source.map,
-        target_from_source=best,
-        tolerance_m=config.verify.tolerance_m,
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
-from mapmerge.match.base import Match
+from mapmerge.match.base import Match, Matcher
 from mapmerge.paper.consensus import best_models, conforming, conforming_to, limits_m, refitted
 from mapmerge.paper.correction import picture_grid
 from mapmerge.paper.features import Features, nearest_pairs, sift
@@ -31,7 +31,7 @@ class _Prepared:
     features_m: Points
 
 
-class ExistingMatcher:
+class ExistingMatcher(Matcher[_Prepared]):
     """Finds a placement from features paired by their descriptors; accepted on the acceptance index alone."""
 
     def prepare(self, grid: Grid, resolution_m: float, config: MergeConfig) -> _Prepared:

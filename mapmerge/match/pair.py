@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -9,18 +10,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmerge.align import Poses, composed, inverses, poses_of
-from mapmerge.match.spectrum import Spectra
+from mapmerge.match.spectrum import Spectra, orientation_spectra
+from mapmerge.prepare import LiveMap
 from mapmerge.prepared import PreparedMap
 from mapmerge.prior import Prior
 from mapmerge.sim2 import Sim2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class DescribedMap:
-    """A map with its orientation spectra."""
+    """A map with its orientation spectra.
 
+    Parameters
+    ----------
+    live
+        What keeps the map up to date.
+    map
+        As it is now.
+    angle_step_rad
+        Step of the angles of the spectra.
+    """
+
+    live: LiveMap
     map: PreparedMap
-    spectra: Spectra
+    angle_step_rad: float
+
+    @functools.cached_property
+    def spectra(self) -> Spectra:
+        """Its orientation spectra; only a search needs them."""
+        return orientation_spectra(self.map.walls_m, self.angle_step_rad, self.map.wall_spacing_m)
 
     @property
     def wall_m(self) -> float:
@@ -33,7 +51,8 @@ class DescribedMap:
         It is the smaller one, which costs less. Of copies, the frames decide.
         """
         mine, others = self.map.grid, other.map.grid
-        key, other_key = (mine.known_area_m2, *mine.cells.shape), (others.known_area_m2, *others.cells.shape)
+        key = self.map.known_area_m2, *mine.cells.shape
+        other_key = other.map.known_area_m2, *others.cells.shape
         if key != other_key:
             return key < other_key
         if not np.array_equal(mine.cells, others.cells):
@@ -97,3 +116,10 @@ class PairOfMaps:
         if self.swapped:
             moved = inverses(moved)
         return self.prior.allows_each(moved[:, :3], slack_m, slack_rad)
+
+
+def ordered(target: DescribedMap, source: DescribedMap, prior: Prior | None = None) -> PairOfMaps:
+    """Return two maps in the order in which they are matched: the smaller one is moved."""
+    swapped = target.comes_before(source)
+    first, second = (source, target) if swapped else (target, source)
+    return PairOfMaps(first, second, prior, swapped)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
-from mapmerge.match.base import Match
+from mapmerge.match.base import Match, Matcher
 from mapmerge.paper.consensus import best_models, conforming_features, conforming_pairs, limits_m, refitted
 from mapmerge.paper.correction import Correction, correct, picture_grid
 from mapmerge.paper.features import Features, one_a_place, sift
@@ -50,7 +50,7 @@ class _Prepared:
     features_m: Points
 
 
-class PaperMatcher:
+class PaperMatcher(Matcher[_Prepared]):
     """Finds a placement from the corners of corrected maps; accepted on the acceptance index alone."""
 
     def prepare(self, grid: Grid, resolution_m: float, config: MergeConfig) -> _Prepared:

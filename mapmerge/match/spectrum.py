@@ -17,6 +17,8 @@ from mapmerge.sim2 import Points
 Spectrum = NDArray[np.float64]
 Spectra = NDArray[np.float64]
 
+_AT_ONCE = 1 << 15
+
 
 def orientation_spectra(walls_m: Points, angle_step_rad: float, bin_m: float) -> Spectra:
     """Return two spectra of the walls for angles from 0 to π, shape (2, A), each with mean 0 and norm 1.
@@ -39,16 +41,37 @@ def orientation_spectra(walls_m: Points, angle_step_rad: float, bin_m: float) ->
     centred = (walls_m - walls_m.mean(axis=0)) / bin_m
     reach = float(np.hypot(centred[:, 0], centred[:, 1]).max())
     bins = math.ceil(2 * reach) + 2
-    spectra = np.empty((2, angles))
-    for index, angle in enumerate(np.arange(angles) * np.pi / angles):
-        offset = centred @ (math.cos(angle), math.sin(angle)) + reach
-        counts = np.bincount(offset.astype(np.intp), minlength=bins)
-        # neighbouring bins are summed so that a wall on the border of two bins counts in full
-        square = np.square(counts[:-1] + counts[1:], dtype=np.float64)
-        spectra[:, index] = square @ square, square.sum()
+    turns = np.arange(angles) * np.pi / angles
+    axes, columns = np.stack([np.cos(turns), np.sin(turns)], axis=1), np.ascontiguousarray(centred.T)
+    at_once = max(1, _AT_ONCE // len(walls_m))
+    parts = [_energies(axes[first : first + at_once], columns, reach, bins) for first in range(0, angles, at_once)]
+    spectra = np.concatenate(parts, axis=1)
     spectra -= spectra.mean(axis=1, keepdims=True)
     norm = np.linalg.norm(spectra, axis=1, keepdims=True)
     return spectra / np.where(norm > 0, norm, 1.0)
+
+
+def _energies(axes: Points, columns: Points, reach: float, bins: int) -> Spectra:
+    """Return the sums of the fourth powers and of the squares of the projections on some axes, shape (2, A).
+
+    Parameters
+    ----------
+    axes
+        Shape (A, 2).
+    columns
+        Points, shape (2, N), in bins.
+    reach
+        How far the furthest one is from the origin.
+    bins
+        How many there are of each projection.
+    """
+    # one count for all axes: the bins of each follow those of the one before
+    place = axes @ columns
+    place += reach + bins * np.arange(len(axes))[:, None]
+    counts = np.bincount(place.astype(np.intp).ravel(), minlength=bins * len(axes)).reshape(len(axes), bins)
+    # neighbouring bins are summed so that a wall on the border of two bins counts in full
+    square = np.square(counts[:, :-1] + counts[:, 1:], dtype=np.float64)
+    return np.stack([np.square(square).sum(axis=1), square.sum(axis=1)])
 
 
 def spectrum_correlation(target: Spectrum, source: Spectrum) -> Spectrum:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -64,8 +65,9 @@ class TranslationSearch:
     free_weights
         What a wall of either map in the other's free space costs, against 1 for a wall on a wall: there is a surface
         for each of these.
-    largest_scale
-        Largest scale of the source that is asked for.
+    turns
+        Those that surfaces are asked for. The coarse maps have room for the source turned, and scaled, by each of them,
+        and no more: what is transformed is often a third smaller than with room for any turn.
     """
 
     def __init__(
@@ -75,12 +77,12 @@ class TranslationSearch:
         cell_m: float,
         max_side_cells: int,
         free_weights: tuple[float, ...],
-        largest_scale: float = 1.0,
+        turns: Sequence[Sim2],
     ) -> None:
-        self._walls_m, self._free_m = source.walls_m, source.free_m
+        self._walls, self._columns_m = len(source.walls_m), _columns(source)
         self._wall_spacing_m = source.wall_spacing_m
-        self._reach_m = largest_scale * float(np.hypot(*source.extent_m))
-        sides_m = [side_m + self._reach_m for side_m in target.extent_m]
+        spans_m = _spans_m(self._columns_m, turns)
+        sides_m = [side_m + span_m for side_m, span_m in zip(target.extent_m, spans_m, strict=True)]
         self._cell_m = max(cell_m, target.resolution_m, max(sides_m) / max_side_cells)
         cols, rows = (math.ceil(side_m / self._cell_m) + 4 for side_m in sides_m)
         self._shape = (cv2.getOptimalDFTSize(rows), cv2.getOptimalDFTSize(cols))
@@ -88,7 +90,7 @@ class TranslationSearch:
         # below the first one
         highest = [math.ceil(side_m / self._cell_m) + 1 for side_m in reversed(target.extent_m)]
         self._below = (self._shape[0] - highest[0], self._shape[1] - highest[1])
-        walls, free = self._rasters(target.walls_m, target.free_m)
+        walls, free = map(self._padded, self._rasters(_columns(target), len(target.walls_m)))
         walls_spectrum, free_spectrum = cv2.dft(cv2.GaussianBlur(walls, (3, 3), 0.0)), cv2.dft(free)
         # what the source's walls meet, and what its free space meets
         self._spectra = [
@@ -101,12 +103,13 @@ class TranslationSearch:
 
         They are followed by those of the source turned by another 180°, whose transforms are the same.
         """
-        walls_m, free_m = turn.apply(self._walls_m), turn.apply(self._free_m)
-        low = np.vstack([walls_m, free_m]).min(axis=0, initial=self._reach_m)
-        rasters = self._rasters(walls_m - low, free_m - low)
+        columns_m = turn.linear @ self._columns_m
+        low_m = columns_m.min(axis=1, keepdims=True) if columns_m.size else np.zeros((2, 1))
+        columns_m -= low_m
         length_m = np.float32(self._wall_spacing_m * turn.scale)
-        walls, free = (np.asarray(cv2.dft(raster * length_m), np.float32) for raster in rasters)
-        low_x_m, low_y_m = low.tolist()
+        rasters = self._rasters(columns_m, self._walls)
+        walls, free = (np.asarray(cv2.dft(self._padded(raster * length_m)), np.float32) for raster in rasters)
+        low_x_m, low_y_m = low_m.ravel().tolist()
         half = Sim2(0.0, 0.0, turn.yaw_rad + math.pi, turn.scale)
         cell_m, (below_y, below_x) = self._cell_m, self._below
         first_m = (-low_x_m - below_x * cell_m, -low_y_m - below_y * cell_m)
@@ -127,18 +130,40 @@ class TranslationSearch:
         ]
         return (*ahead, *back)
 
-    def _rasters(self, walls_m: Points, free_m: Points) -> tuple[Surface, Surface]:
-        """Return the count of walls, and which cells are free and not beside a wall, where a cell tells nothing."""
-        walls = self._raster(walls_m)
-        free = np.minimum(self._raster(free_m), np.float32(1.0))
-        free[cv2.dilate(walls, np.ones((3, 3), np.uint8)) > 0] = 0.0
-        return walls, free
+    def _rasters(self, columns_m: Points, walls: int) -> tuple[Surface, Surface]:
+        """Return the count of walls, and which cells are free and not beside a wall, where a cell tells nothing.
 
-    def _raster(self, points_m: Points) -> Surface:
-        rows, cols = self._shape
-        cell = (points_m * (1.0 / self._cell_m)).astype(np.intp)
-        index = np.clip(cell[:, 1], 0, rows - 1) * cols + np.clip(cell[:, 0], 0, cols - 1)
-        return np.bincount(index, minlength=rows * cols).astype(np.float32).reshape(rows, cols)
+        They are as large as what is on them. Of the points, shape (2, N), so many are walls, and the others free.
+        """
+        most_rows, most_cols = self._shape
+        cell = (columns_m * (1.0 / self._cell_m)).astype(np.intp)
+        col, row = np.clip(cell[0], 0, most_cols - 1), np.clip(cell[1], 0, most_rows - 1)
+        rows, cols = int(row.max(initial=0)) + 1, int(col.max(initial=0)) + 1
+        index = row * cols + col
+        count = np.bincount(index[:walls], minlength=rows * cols).astype(np.float32).reshape(rows, cols)
+        free = np.zeros(rows * cols, np.float32)
+        free[index[walls:]] = 1.0
+        return count, free.reshape(rows, cols) * (cv2.dilate(count, np.ones((3, 3), np.uint8)) == 0.0)
+
+    def _padded(self, raster: Surface) -> Surface:
+        padded = np.zeros(self._shape, np.float32)
+        padded[: raster.shape[0], : raster.shape[1]] = raster
+        return padded
+
+
+def _columns(prepared: PreparedMap) -> Points:
+    """Return the points on walls, then those in free space, shape (2, N)."""
+    return np.ascontiguousarray(np.concatenate([prepared.walls_m, prepared.free_m]).T)
+
+
+def _spans_m(columns_m: Points, turns: Sequence[Sim2]) -> tuple[float, float]:
+    """Return the largest width and height of some points, shape (2, N), at any of the turns."""
+    if columns_m.size == 0:
+        return 0.0, 0.0
+    hull_m = cv2.convexHull(columns_m.T.astype(np.float32)).reshape(-1, 2).astype(np.float64)
+    spans_m = np.array([np.ptp(turn.apply(hull_m), axis=0) for turn in turns]).reshape(-1, 2)
+    width_m, height_m = spans_m.max(axis=0, initial=0.0).tolist()
+    return width_m, height_m
 
 
 def surface_peaks(surface: CorrelationSurface, peak_distance_m: float) -> tuple[Poses, NDArray[np.float32]]:
@@ -153,13 +178,15 @@ def surface_peaks(surface: CorrelationSurface, peak_distance_m: float) -> tuple[
     """
     reach = max(1, round(peak_distance_m / surface.step_m))
     highest = cv2.dilate(surface.values, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
-    rows, cols = np.nonzero((surface.values >= highest) & (surface.values > 0))
-    order = np.argsort(-surface.values[rows, cols], kind="stable")
-    rows, cols = rows[order], cols[order]
+    # flat: of two dimensions it takes ten times as long to find a few among many
+    found = np.flatnonzero((surface.values >= highest) & (surface.values > 0))
+    values = surface.values.ravel()[found]
+    order = np.argsort(-values, kind="stable")
+    rows, cols = np.divmod(found[order], surface.values.shape[1])
     poses = np.empty((len(rows), 4))
     poses[:, 0], poses[:, 1] = surface.shift_m(rows, cols)
     poses[:, 2:] = surface.turn.yaw_rad, surface.turn.scale
-    return poses, surface.values[rows, cols]
+    return poses, values[order]
 
 
 def _correlated(target: tuple[Surface, Surface], walls: Surface, free: Surface, conjugate: bool) -> Surface:

@@ -40,9 +40,9 @@ def test_mapmerge_works_where_nothing_else_is_installed() -> None:
     blocked = sorted({"replay", "rosbags", "mcap", "rerun", "rich", "ruamel"})
     loaded(
         f"import sys\nfor name in {blocked}: sys.modules[name] = None\n"
-        "import numpy as np\nfrom mapmerge import Grid, MergeConfig, MergeState, step\n"
+        "import numpy as np\nfrom mapmerge import Grid, Merger\n"
         "grid = Grid(np.zeros((9, 9), np.int8), 0.1)\n"
-        "step(MergeState.initial(['a', 'b']), {'a': grid, 'b': grid}, MergeConfig())"
+        "Merger(['a', 'b']).step({'a': grid, 'b': grid})"
     )
 
 

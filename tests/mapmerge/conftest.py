@@ -9,13 +9,13 @@ import pytest
 
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
-from mapmerge.match import MATCHERS, Match, Rival
+from mapmerge.match import MATCHERS, Match, Matcher, Rival
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import IDENTITY
 from mapmerge.verify import Scores
 
 
-class ScriptedMatcher:
+class ScriptedMatcher(Matcher):
     """Knows maps by the value that fills them, merged maps by the values of all, and counts what it is asked."""
 
     config = MergeConfig(method="scripted")

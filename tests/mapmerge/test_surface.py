@@ -17,12 +17,13 @@ PLACES = [Sim2(), Sim2(3.0, -2.0), Sim2(-1.7, 1.1, 0.6), Sim2(0.4, 9.0, -2.8)]
 PARTS = [(1.0, 1.0), (1.0, 29.0), (44.0, 2.0), (45.0, 28.0)]
 
 
-def searched(target, source, cell_m=SEARCH.cell_m, most=SEARCH.max_side_cells, largest_scale=1.0):
-    return TranslationSearch(target, source, cell_m, most, WEIGHTS, largest_scale)
+def searched(target, source, turn=IDENTITY, most=SEARCH.max_side_cells):
+    return TranslationSearch(target, source, SEARCH.cell_m, most, WEIGHTS, [turn])
 
 
 def surfaces(target, source, yaw_rad=0.0, scale=1.0):
-    return searched(target, source, largest_scale=max(1.0, scale)).surfaces(Sim2(0.0, 0.0, yaw_rad, scale))
+    turn = Sim2(0.0, 0.0, yaw_rad, scale)
+    return searched(target, source, turn).surfaces(turn)
 
 
 def peaks(surface):
@@ -96,6 +97,16 @@ class TestShift:
                 assert y_m.min() <= target.walls_m[:, 1].min() - corners_m[:, 1].max() + slack_m
                 assert x_m.max() >= target.walls_m[:, 0].max() - corners_m[:, 0].min() - slack_m
                 assert y_m.max() >= target.walls_m[:, 1].max() - corners_m[:, 1].min() - slack_m
+
+    def test_room_for_other_turns_changes_no_value(self):
+        target, source = prepared_map(flat(ragged=1)), prepared_map(flat(Sim2(-1.0, -1.0, 0.4), ragged=2))
+        turns = [Sim2(yaw_rad=yaw_rad) for yaw_rad in (0.4, 1.0, 2.7)]
+        for turn in turns:
+            together = TranslationSearch(target, source, 0.2, 1500, WEIGHTS, turns).surfaces(turn)
+            for one, alone in zip(together, searched(target, source, turn).surfaces(turn), strict=True):
+                poses, values = peaks(alone)
+                for pose, value in zip(poses[:5], values[:5], strict=True):
+                    assert one.values[one.index(Sim2(*pose.tolist()))] == pytest.approx(value, rel=1e-4)
 
     def test_the_value_of_a_placement_is_that_of_its_shift(self):
         target, source = prepared_map(flat(ragged=1)), prepared_map(flat(Sim2(-1.0, -1.0, 0.4), ragged=2))

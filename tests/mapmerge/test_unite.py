@@ -8,7 +8,7 @@ import pytest
 
 from mapmerge.config import HIGHEST_CONFIDENCE, MergeConfig, VerifyConfig
 from mapmerge.graph import Edge, place
-from mapmerge.merger import MergeState, step
+from mapmerge.merger import Merger
 from mapmerge.outcome import Status
 from mapmerge.prior import Prior
 from mapmerge.reasons import ReasonCode
@@ -28,12 +28,11 @@ class Session:
 
     def __init__(self, matcher, robots=ROBOTS[:3]):
         self.matcher = matcher
-        self.state = MergeState.initial(robots)
+        self.merger = Merger(robots, matcher.config)
 
     def step(self, priors=None, **values):
         updates = {robot: self.matcher.map_of(value) for robot, value in values.items()}
-        self.state, result = step(self.state, updates, self.matcher.config, priors)
-        return result
+        return self.merger.step(updates, priors)
 
 
 def of_merged_maps(calls):
@@ -300,8 +299,9 @@ class TestRealMaps:
     @functools.cache
     def surety_of_the_first(*maps):
         order = tuple(PARTS_M)
-        state, _ = step(MergeState.initial(order), dict(zip(order, maps, strict=True)), CONFIG)
-        (union,) = state.unions.matches.values()
+        merger = Merger(order, CONFIG)
+        merger.step(dict(zip(order, maps, strict=True)))
+        (union,) = merger.unions.values()
         return union.confidence
 
     def surety(self, flats):
@@ -309,8 +309,9 @@ class TestRealMaps:
 
     @pytest.mark.parametrize("order", list(itertools.permutations(PARTS_M)))
     def test_all_are_placed_in_any_order(self, flats, order):
-        state, result = step(MergeState.initial(order), {robot: flats[robot] for robot in order}, CONFIG)
-        (union,) = state.unions.matches.values()
+        merger = Merger(order, CONFIG)
+        result = merger.step({robot: flats[robot] for robot in order})
+        (union,) = merger.unions.values()
         assert union.confidence == pytest.approx(self.surety(flats), abs=1e-3)  # in whatever order
         for robot in order[1:]:
             found = result.robots[robot]
@@ -322,16 +323,17 @@ class TestRealMaps:
 
     @pytest.mark.parametrize("kept", list(itertools.combinations(PARTS_M, 2)))
     def test_no_pair_places_the_third(self, flats, kept):
-        _, result = step(MergeState.initial(kept), {robot: flats[robot] for robot in kept}, CONFIG)
+        result = Merger(kept, CONFIG).step({robot: flats[robot] for robot in kept})
         assert [pair.accepted for pair in result.pairs.values()] == ["r3" not in kept]
 
     def test_a_stranger_stays_out(self, flats):
         _, stranger, _ = hall_and_part((2.0, 28.0), 0.4)
         robots = ("r1", "r2", "r4", "r3")
-        state, result = step(MergeState.initial(robots), {**flats, "r4": stranger}, CONFIG)
+        merger = Merger(robots, CONFIG)
+        result = merger.step({**flats, "r4": stranger})
         assert [outcome.status for outcome in result.robots.values()][1:] == [
             Status.MERGED,
             Status.UNMERGED,
             Status.MERGED,
         ]
-        assert not any(match.accepted for key, match in state.unions.matches.items() if "r4" in dict(sum(key, ())))
+        assert not any(match.accepted for key, match in merger.unions.items() if "r4" in dict(sum(key, ())))

@@ -5,9 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
-from mapmerge.merger import MergeState, step
+from mapmerge.merger import Merger
 from mapmerge.render import Picture
 from replay.gallery import Gallery
 from replay.options import ImageChoice
@@ -26,9 +25,10 @@ RUN: tuple[Mapping[str, Grid], ...] = (
 
 def shown(choice: ImageChoice, run: tuple[Mapping[str, Grid], ...] = RUN) -> list[dict[str, list[str]]]:
     """Return the steps shown for each robot after each step of a run."""
-    gallery, state, found = Gallery(choice), MergeState.initial(["r1", "r2", "r3"]), []
+    merger = Merger(["r1", "r2", "r3"])
+    gallery, found = Gallery(choice, merger.explain), []
     for grids in run:
-        state, result = step(state, grids, MergeConfig())
+        result = merger.step(grids)
         pictures: dict[str, list[str]] = {}
         for item in gallery.due(result):
             assert item.picture.rgb.dtype == "uint8"

@@ -10,10 +10,9 @@ from typing import Any
 import jsonschema
 import pytest
 
-from mapmerge.config import MergeConfig
 from mapmerge.fuse import Agreement
 from mapmerge.grid import Grid
-from mapmerge.merger import MergeResult, MergeState, step
+from mapmerge.merger import Merger, MergeResult
 from mapmerge.outcome import RobotOutcome, Status
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
@@ -45,9 +44,9 @@ def builder(robots: tuple[str, ...] = ROBOTS) -> ReportBuilder:
 
 def reported(*steps: Mapping[str, Grid], robots: tuple[str, ...] = ROBOTS) -> list[Report]:
     """Return the report after each step, all checked against the schema."""
-    report, state, found = builder(robots), MergeState.initial(robots), []
+    report, merger, found = builder(robots), Merger(robots), []
     for stamp_ns, grids in enumerate(steps):
-        state, result = step(state, grids, MergeConfig())
+        result = merger.step(grids)
         report.take(stamp_ns, result)
         found.append(report.build(stamp_ns, result, [INPUT]))
         validate(found[-1])
@@ -60,7 +59,7 @@ def validate(report: Report) -> None:
 
 
 def test_before_any_map() -> None:
-    report = builder().build(None, MergeState.initial(ROBOTS).result, [INPUT])
+    report = builder().build(None, Merger(ROBOTS).result, [INPUT])
     validate(report)
     assert (report["schema"], report["version"], report["stamp_ns"]) == ("replay.report/1", "1.2.3", None)
     assert (report["reference"], report["updates"]) == ("r1", 0)
@@ -125,7 +124,7 @@ def test_skipped_messages_are_counted_by_cause() -> None:
     report = builder()
     for cause in (SkipCause.EMPTY, SkipCause.BAD_ORIGIN, SkipCause.EMPTY):
         report.skip(Skipped("r1", "/r1/map", 5, cause, "detail", "run.mcap"))
-    found = report.build(None, MergeState.initial(ROBOTS).result, [INPUT])
+    found = report.build(None, Merger(ROBOTS).result, [INPUT])
     validate(found)
     assert list(found["skipped"].items()) == [("bad_origin", 1), ("empty", 2)]
 
@@ -134,7 +133,7 @@ def test_what_was_believed() -> None:
     prior = Prior(Sim2(1.23456789, 2.0, 0.5), 0.5, 0.6, 0.1, "recorded in /tf")
     report, priors = builder(), {"r2": prior}
     maps = {robot: flat_map(robot) for robot in ("r1", "r2")}
-    _, result = step(MergeState.initial(ROBOTS), maps, MergeConfig(), priors)
+    result = Merger(ROBOTS).step(maps, priors)
     report.take(0, result, priors)
     found = report.build(0, result, [INPUT])
     validate(found)
@@ -151,7 +150,7 @@ def test_notes_are_kept_in_order() -> None:
     report = builder()
     for robot in ("r3", "r2"):
         report.note(Noted(robot, f"of {robot}"))
-    found = report.build(None, MergeState.initial(ROBOTS).result, [INPUT])
+    found = report.build(None, Merger(ROBOTS).result, [INPUT])
     validate(found)
     assert found["notes"] == [{"robot": "r3", "message": "of r3"}, {"robot": "r2", "message": "of r2"}]
 
@@ -160,7 +159,7 @@ class TestNumbers:
     @staticmethod
     def placed(pose: Sim2, agreement: Agreement | None = None) -> dict[str, Any]:
         outcome = RobotOutcome(Status.MERGED, Reason(ReasonCode.ACCEPTED, "x"), pose, agreement)
-        known = MergeState.initial(["r1"]).result
+        known = Merger(["r1"]).result
         result: MergeResult = replace(known, robots={"r1": outcome})
         report = builder(("r1",)).build(0, result, [INPUT])
         validate(report)

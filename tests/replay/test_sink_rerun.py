@@ -18,7 +18,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from mapmerge.grid import Grid
-from mapmerge.merger import MergeState, step
+from mapmerge.merger import Merger
 from mapmerge.outcome import Status
 from mapmerge.sim2 import IDENTITY, Sim2
 from replay.errors import OutputError
@@ -54,17 +54,18 @@ def events_of(
     """Return what a run with these maps would yield, as `replay.pipeline.run` does."""
     inputs = tuple(RobotInput(robot, f"/{robot}/map", f"{robot}/map", "header", (0,), 9) for robot in robots)
     settings = OPTIONS.settings()
-    report, gallery, state = ReportBuilder(inputs, settings, "9.9"), Gallery("changed"), MergeState.initial(robots)
+    merger = Merger(robots, OPTIONS.merge)
+    report, gallery = ReportBuilder(inputs, settings, "9.9"), Gallery("changed", merger.explain)
     found: list[Event] = [Started(inputs, settings, ({"name": "run.mcap"},))]
     for stamp_ns, grids in ticks.items():
         if skipped and stamp_ns in skipped:
             found.append(skipped[stamp_ns])
-        state, result = step(state, grids, OPTIONS.merge)
+        result = merger.step(grids)
         report.take(stamp_ns, result)
         written = report.build(stamp_ns, result, ({"name": "run.mcap"},))
         found.append(Merged(stamp_ns, result, written, gallery.due(result), Timing(0.1, 0.2), 1, 9))
     last_ns = max(ticks, default=None)
-    return [*found, Finished(report.build(last_ns, state.result, ({"name": "run.mcap", "sha256": "ab"},)))]
+    return [*found, Finished(report.build(last_ns, merger.result, ({"name": "run.mcap", "sha256": "ab"},)))]
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.paper_cases import MAX_ERROR_DEG, MAX_ERROR_M, Case, errors, load_map, run
 from mapmerge.config import MergeConfig
-from mapmerge.merger import MergeState, step
+from mapmerge.merger import Merger
 from mapmerge.reasons import ReasonCode
 from mapmerge.sim2 import Sim2
 from tests.data_paths import shared_data
@@ -50,7 +50,7 @@ def test_three_maps_are_placed_though_two_of_them_look_alike():
     """y1 on y2 directly is a false merge that ω alone accepts; the placement by way of y3 is trusted more."""
     folder = shared_data("paper")
     grids = {name: load_map(folder, f"scenario2_{name}") for name in ("y1", "y2", "y3")}
-    _, result = step(MergeState.initial(["y3", "y1", "y2"]), grids, PAPER)
+    result = Merger(["y3", "y1", "y2"], PAPER).step(grids)
     for name, truth in SCENARIO_2.items():
         found = result.robots[name].merged_from_map
         error_m, error_deg = errors(found, truth, middle_m(grids[name]))
