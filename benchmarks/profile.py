@@ -1,8 +1,8 @@
 """Where the time of a replay goes: ``python -m benchmarks.profile RECORDING --output flame.svg``.
 
 `py-spy` samples the program a hundred times a second and writes the flame graph, which any browser shows. The table of
-parts is of the same samples: each belongs to the innermost function on its stack that `PARTS` knows, but all below a
-function that prepares a map to that. Work of libraries goes to whoever called them. Samples are wall time while Python
+parts is of the same samples: each belongs to the innermost function on its stack that `PARTS` knows, but all below one
+of a part in `WHOLE` to that. Work of libraries goes to whoever called them. Samples are wall time while Python
 or what it called was running; OpenCV uses one thread.
 """
 
@@ -23,19 +23,20 @@ from xml.etree import ElementTree as ET
 
 _SCRIPT = "import sys; from replay.cli import main; sys.exit(main())"
 _SVG, _INFERNO = "{http://www.w3.org/2000/svg}", "{http://github.com/jonhoo/inferno}"
-REST, PREPARING = "rest", "preparing maps"
+REST, PREPARING, RERUN, IMAGES = "rest", "preparing maps", "writing .rrd", "images"
+WHOLE = frozenset({PREPARING, RERUN, IMAGES})
 PARTS: Mapping[str, str] = {
     r"<frozen importlib": "starting",
-    r"^count \(replay/arrivals\.py": "digests of the input",
+    r"\bcount \(replay/arrivals\.py": "digests of the input",
     r"\(replay/sources/": "reading",
     r"\(replay/(codec/de|assemble|arrivals|timeline)": "decoding, putting in order",
-    r"^prepare \(mapmerge/": PREPARING,
+    r"\bprepare \(mapmerge/|\(mapmerge/(prepare|walls)\.py": PREPARING,
     r"\(mapmerge/(match/|align|polish|score|verify|graph|unite)": "matching",
     r"\(mapmerge/fuse": "fusing",
     r"\(mapmerge/merger": "rest of the merger",
     r"\(mapmerge/outcome|\(replay/report|\(json/": "report",
-    r"\(replay/gallery|\(mapmerge/render": "images",
-    r"\(replay/sinks/rerun": "writing .rrd",
+    r"\(replay/gallery|\(mapmerge/render": IMAGES,
+    r"\(replay/sinks/rerun": RERUN,
     r"\(replay/(sinks/|codec/en)": "writing",
 }
 
@@ -77,7 +78,7 @@ def shares(boxes: Sequence[Frame]) -> dict[str, float]:
     for box in sorted(boxes, key=lambda item: item.depth):
         part = part_of(box.name)
         for sample in range(box.first, box.first + box.count):
-            if part is not None and parts[sample] != PREPARING:
+            if part is not None and parts[sample] not in WHOLE:
                 parts[sample] = part
     return {part: count / len(parts) for part, count in Counter(parts).most_common()}
 

@@ -24,14 +24,14 @@ class TestShares:
     def test_all_that_prepares_a_map_is_preparing(self):
         boxes = [
             Frame("match (mapmerge/match/correlation.py:60)", 0, 0, 4),
-            Frame("prepare (mapmerge/match/correlation.py:50)", 1, 0, 3),
+            Frame("CorrelationMatcher.prepare (mapmerge/match/correlation.py:50)", 1, 0, 3),
             Frame("orientation_spectra (mapmerge/match/spectrum.py:30)", 2, 0, 3),
         ]
         assert shares(boxes) == {"preparing maps": 0.75, "matching": 0.25}
 
     def test_helpers_work_for_their_callers(self):
         assert part_of("decode (replay/codec/decode.py:47)") == "decoding, putting in order"
-        assert part_of("count (replay/arrivals.py:61)") == "digests of the input"
+        assert part_of("Tally.count (replay/arrivals.py:61)") == "digests of the input"
         assert part_of("apply (mapmerge/sim2.py:70)") is None
         assert part_of("_count_dispatcher (numpy/lib/arraysetops.py:3)") is None
 
