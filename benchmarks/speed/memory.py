@@ -15,7 +15,7 @@ from benchmarks.speed.printed import Table, at_most, mebibytes, ratio, seconds
 
 MOST_GROWTH = 1.1
 MOST_HUGE_BYTES = 4 << 30
-TABLE = Table(34, ("mission", "updates", "peak", "to the last", "wall"))
+TABLE = Table(14, ("mission", "updates", "peak", "to the last", "wall"))
 
 
 def lines(options: Options) -> Iterator[str]:

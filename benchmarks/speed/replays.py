@@ -19,7 +19,7 @@ from benchmarks.speed.replaying import import_all, map_topics, replay_s
 MOST = 3.0
 _SECONDS, _SHORT_RUNS = 10.0, 3
 TABLE = Table(
-    34, ("recording", "maps", "wall", "processor", "peak", "in process", "read", "write", "ratio", "×.rrd", "×images")
+    26, ("recording", "maps", "wall", "processor", "peak", "in process", "read", "write", "ratio", "×.rrd", "×images")
 )
 
 

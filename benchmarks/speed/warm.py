@@ -24,7 +24,7 @@ from replay.messages import GridMessage
 from replay.sources.base import RawMessage
 
 MOST = 2.0
-_FEWEST_UPDATES = 40
+_FEWEST_UPDATES, _FIRST_ROUNDS = 40, 2
 TABLE = Table(14, ("cells", "updates", "update", "floor", "ratio", "slowest", "merged"))
 
 
@@ -45,8 +45,9 @@ def mission_of(side: int, options: Options) -> Mission:
 
 
 def measured(mission: Mission, options: Options) -> tuple[str, float]:
-    """Return the line of one size, and the median ratio: the robots take turns, a round each that does not count."""
-    raws = last_messages(recorded(mission, options.work), 2 * (options.rounds + 2))
+    """Return the line of one size, and the median ratio: the robots take turns; the first maps do not count."""
+    first = _FIRST_ROUNDS * mission.robots
+    raws = last_messages(recorded(mission, options.work), first + options.rounds * mission.robots)
     take = merger(mission.robot_names)
     spent: list[tuple[float, float]] = []
     merged = 0
@@ -56,7 +57,7 @@ def measured(mission: Mission, options: Options) -> tuple[str, float]:
         result = take({robot: _decoded(raw)})
         between = process_time()
         floor(raw)
-        if number >= 4:
+        if number >= first:
             spent.append((between - begin, process_time() - between))
             merged += result.robots[mission.robot_names[1]].merged_from_map is not None
     return _line(_decoded(raws[-1]), spent, merged)
