@@ -1,4 +1,4 @@
-"""Measurements of placements against known truth; docs/benchmarks.md says of what.
+"""Measurements of placements against known truth, of time and of memory; docs/ says of what.
 
 ::
 
@@ -10,4 +10,8 @@
     verdicts, criteria, reliability       what is right, what must hold, what a confidence is worth
     distribution                          whether simulated maps are as messy as real ones
     tables, reports                       what is printed
+
+    speed/                                the command for time and memory, one module a section
+    profile                               where the time of a replay goes
+    large, long_mission, huge_mission     what speed is measured on
 """
