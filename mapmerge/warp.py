@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -72,23 +73,34 @@ class Warp:
         return _box_around(corners @ linear.T)
 
     def tile(self, box: Box) -> Bytes | None:
-        """Return its cells on a box of the canvas, or None if it does not reach there."""
+        """Return its cells on a tile of the canvas, `UNKNOWN_BYTE` elsewhere, or None if it does not reach there.
+
+        A cell of the canvas has the value of the layer's cell in which its middle lies, to a thousandth of a cell.
+        """
         if self.box.within(box).is_empty:
             return None
-        (a, b, x), (c, d, y) = self.cell_from_canvas
-        across, up = np.arange(box.left, box.right) + 0.5, np.arange(box.top, box.bottom)[:, None] + 0.5
-        # from the canvas' own numbers, so that the outcome does not depend on where tiles begin
-        col, row = (
-            np.floor(a * across + x + b * up).astype(np.int32),
-            np.floor(c * across + y + d * up).astype(np.int32),
-        )
-        rows, cols = self.cells.shape
-        inside = (col >= 0) & (col < cols) & (row >= 0) & (row < rows)
-        if not inside.any():
+        whole = Box(0, 0, *self.cells.shape)
+        seen = self._under(box).within(whole)
+        if seen.is_empty:
             return None
-        tile = np.full(inside.shape, UNKNOWN_BYTE, np.uint8)
-        tile[inside] = self.cells[row[inside], col[inside]]
-        return tile
+        matrix = self.cell_from_canvas.copy()
+        # from the middles of pixels of the tile to those of the layer's part that is seen, as OpenCV counts them
+        matrix[:, 2] += matrix[:, :2] @ (box.left + 0.5, box.top + 0.5) - (seen.left + 0.5, seen.top + 0.5)
+        rows, cols = box.shape
+        found = cv2.warpAffine(
+            self.cells[seen.slices(whole)],
+            matrix,
+            (cols, rows),
+            flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=UNKNOWN_BYTE,
+        )
+        return np.asarray(found, np.uint8)
+
+    def _under(self, box: Box) -> Box:
+        """Return the cells of the layer that may lie under some cells of the canvas."""
+        corners = np.array([[box.left, box.top], [box.right, box.top], [box.left, box.bottom], [box.right, box.bottom]])
+        return _box_around(corners @ self.cell_from_canvas[:, :2].T + self.cell_from_canvas[:, 2]).padded(2)
 
 
 def warped(layer: Layer, lattice: Grid, config: CellConfig) -> Warp:

@@ -314,13 +314,13 @@ class TestTiles:
         grids = [grid_of(blob(seed)) for seed in (1, 2, 3)]
         poses = [IDENTITY, Sim2(0.7, 0.3), Sim2(-2.0, 1.1, math.pi / 2)]
         whole = fused(*grids, poses=poses)
-        monkeypatch.setattr(fuse_module, "_TILE_CELLS", tile)
+        monkeypatch.setattr(fuse_module, "TILE_CELLS", tile)
         tiled = fused(*grids, poses=poses)
         assert tiled.grid.same_as(whole.grid)
         assert tiled.agreements == whole.agreements
 
     def test_far_apart_maps_leave_tiles_empty(self, monkeypatch):
-        monkeypatch.setattr(fuse_module, "_TILE_CELLS", 16)
+        monkeypatch.setattr(fuse_module, "TILE_CELLS", 16)
         fusion = fused(grid_of(blob(1)), grid_of(blob(2)), poses=[IDENTITY, Sim2(20.0, 20.0)])
         assert fusion.grid.known.sum() == (blob(1) >= 0).sum() + (blob(2) >= 0).sum()
         assert fusion.agreements[0].overlap_fraction == 0.0

@@ -103,7 +103,7 @@ def test_values_stay_in_range_and_agreements_are_shares(placed, lattice):
 @example([HALF_A_CELL_OFF], LATTICE, 1)
 def test_tiles_do_not_matter(placed, lattice, tile):
     whole = fuse(placed, lattice, CELLS)
-    with patch.object(fuse_module, "_TILE_CELLS", tile):
+    with patch.object(fuse_module, "TILE_CELLS", tile):
         tiled = fuse(placed, lattice, CELLS)
     assert tiled.grid.same_as(whole.grid)
     assert tiled.agreements == whole.agreements
