@@ -109,12 +109,12 @@ class Canvas:
         covered = NOTHING
         for warp in warps.values():
             covered = covered.union(warp.box)
-        is_same = covered == self._cells.box and not dirty and self._grid is not None
+        is_same = self._grid is not None and covered == self._cells.box
         self._warps = warps
         self._counts = {name: self._counts.get(name, Counts()) for name in warps}
         self._cells.cover(covered)
         for tile in sorted(dirty):
-            self._renew(tile)
+            is_same &= not self._renew(tile)
         if self._grid is None or not is_same:
             self._grid = self._published(self._lattice)
         cell_m2 = lattice.resolution_m**2
@@ -140,19 +140,22 @@ class Canvas:
             if warp is not None:
                 yield from _tiles(warp.box)
 
-    def _renew(self, tile: Box) -> None:
-        """Fuse the cells of a tile, and count them instead of what was there before."""
+    def _renew(self, tile: Box) -> bool:
+        """Fuse the cells of a tile, and count them instead of what was there; tell whether a cell changed."""
         self._count(self._tiles.pop(tile, None), -1)
         on_tile = {name: warp.tile(tile) for name, warp in self._warps.items()}
         present = {name: cells for name, cells in on_tile.items() if cells is not None}
         inside = tile.within(self._cells.box)
-        if not present:
-            self._cells.part(inside)[:] = 0
-            return
-        cells, fused = self._odds.fuse(present)
-        self._cells.part(inside)[:] = cells[inside.slices(tile)].view(np.uint8) + np.uint8(1)
-        self._tiles[tile] = fused
-        self._count(fused, 1)
+        shown = self._cells.part(inside)
+        if present:
+            cells, self._tiles[tile] = self._odds.fuse(present)
+            self._count(self._tiles[tile], 1)
+            new = cells[inside.slices(tile)].view(np.uint8) + np.uint8(1)
+        else:
+            new = np.zeros(inside.shape, np.uint8)
+        is_changed = not np.array_equal(shown, new)
+        shown[:] = new
+        return is_changed
 
     def _count(self, fused: Fused | None, sign: int) -> None:
         if fused is None:

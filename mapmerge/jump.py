@@ -50,7 +50,7 @@ def difference(before: Grid, after: Grid, config: MergeConfig) -> Difference:
         return _compared(old, after.cells, _Totals.of(old, config), config, after.resolution_m)
     reach = max(1, round(config.verify.tolerance_m / after.resolution_m)) + 2
     around = changed.padded(reach)
-    old, new = _read(before, around.shifted(-offset[0], -offset[1])), _read(after, around)
+    old, new = _read(before, around.shifted(*offset)), _read(after, around)
     totals = _Totals.of(before.cells, config)
     return _compared(old, new, totals, config, after.resolution_m)
 

@@ -61,7 +61,7 @@ class Watch:
         What either knew.
     overlap_m2, agreement, likeness
         Of the placement that was accepted then: what it shared, the share of the walls that agreed, and the score of
-        the best rival over its own; 0 if there was none.
+        the best rival over its own; 0 without a placement, or a rival.
     wait
         After how many updates without a placement the next search is due at the latest.
     waited
@@ -79,8 +79,7 @@ class Watch:
     def of(match: Match, areas_m2: tuple[float, float], before: Watch | None, config: WatchConfig) -> Watch:
         """Return the watch over a pair that was just searched: without a placement, the next wait is twice as long."""
         if match.accepted and match.scores is not None:
-            likeness = match.cues.contest.likeness if match.cues is not None else 0.0
-            return Watch(areas_m2, match.scores.overlap_m2, match.scores.wall_agreement, likeness)
+            return Watch(areas_m2, match.scores.overlap_m2, match.scores.wall_agreement, match.likeness)
         return Watch(areas_m2, wait=1 if before is None else min(2 * before.wait, config.longest_wait))
 
     def updated(self) -> Watch:
@@ -98,7 +97,7 @@ class Watch:
             return Trigger.WEAKENED
         if match.scores.wall_agreement < self.agreement - config.agreement_drop:
             return Trigger.WEAKENED
-        if match.cues is not None and match.cues.contest.likeness > self.likeness + config.likeness_rise:
+        if match.likeness > self.likeness + config.likeness_rise:
             return Trigger.RIVAL_GAINED
         if match.scores.overlap_m2 >= config.overlap_growth * self.overlap_m2:
             return Trigger.OVERLAP_GREW

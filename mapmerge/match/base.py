@@ -84,6 +84,14 @@ class Match:
             return self.weight
         return self.scores.score_m if self.scores is not None else 0.0
 
+    @property
+    def likeness(self) -> float:
+        """Score of the best rival over that of the placement, 0 to 1; 0 without a rival."""
+        if self.scores is None or self.scores.score_m <= 0.0:
+            return 1.0
+        best_m = max((rival.score_m for rival in self.rivals), default=0.0)
+        return min(1.0, max(0.0, best_m / self.scores.score_m))
+
     def inverse(self) -> Match:
         """Return the match of the same maps, swapped; its evidence must be told afterwards."""
         pose = self.target_from_source

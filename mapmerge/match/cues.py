@@ -14,7 +14,7 @@ from mapmerge.match.slack import slack
 from mapmerge.prepared import PreparedMap
 from mapmerge.score import far_share
 from mapmerge.sim2 import Sim2
-from mapmerge.verify import Scores, verified
+from mapmerge.verify import verified
 
 _HOLDS = 0.25
 
@@ -109,16 +109,11 @@ class Cues:
 
 def fit_of(pair: PairOfMaps, target_from_source: Sim2, config: MergeConfig) -> Fit:
     """Return how well the maps fit at a placement between the grid frames."""
-    return fit_and_scores(pair, target_from_source, config)[0]
-
-
-def fit_and_scores(pair: PairOfMaps, target_from_source: Sim2, config: MergeConfig) -> tuple[Fit, Scores]:
-    """Return how well the maps fit at a placement between the grid frames, and what is reported of it."""
     target, source = pair.target.map, pair.source.map
     scores, found = verified(target, source, target_from_source, config.verify)
     aligned, held_m = _direction(target, source, poses_of([target_from_source]), config.verify)
     bent = slack(target, source, target_from_source, config.slack)
-    fit = Fit(
+    return Fit(
         score_m=scores.score_m,
         contradicted_m=bent.contradicted_m,
         wall_agreement=scores.wall_agreement,
@@ -133,7 +128,6 @@ def fit_and_scores(pair: PairOfMaps, target_from_source: Sim2, config: MergeConf
         aligned=aligned,
         held_m=held_m,
     )
-    return fit, scores
 
 
 def clearance(lead_m: float, contradicted_m: float) -> float:

@@ -1,4 +1,4 @@
-"""A placement that was accepted, followed while the maps grow: aligned from where it was, and verified.
+"""A placement that was accepted, followed while the maps grow: aligned from where it was, and verified on a sample.
 
 That costs a small part of a search, and is as good as long as the evidence holds. It is not where it does not: in a
 periodic corridor a wrong placement goes on to fit. `mapmerge.watch` says when a search comes back.
@@ -10,23 +10,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from mapmerge.align import align, evenly, placed, placement_of, poses_of
+from mapmerge.align import Poses, align, evenly, placed, placement_of, poses_of
 from mapmerge.config import MergeConfig
-from mapmerge.match.base import Match, Rival
-from mapmerge.match.confidence import confidence, contest, log_odds_of, times_as_likely
-from mapmerge.match.cues import Cues, Fit, fit_and_scores
-from mapmerge.match.look import scored
+from mapmerge.match.base import Match
 from mapmerge.match.pair import PairOfMaps
-from mapmerge.match.verdict import judge
+from mapmerge.match.verdict import held
 from mapmerge.polish import polish
+from mapmerge.prepared import CELL_UNKNOWN
 from mapmerge.reasons import ReasonCode
+from mapmerge.score import agreement, probe
 from mapmerge.sim2 import Points, Sim2
+from mapmerge.verify import Scores
+
+_AREA_POINTS = 8000
 
 
 def followed(pair: PairOfMaps, known: Match, config: MergeConfig) -> Match:
     """Return how an accepted placement fits the maps as they are now.
 
-    Its rivals are those of the last search. How they fit is not computed anew, but how much they have gained is.
+    Its scores are estimates from a sample of both maps; its confidence and its rivals are those of the last search, but
+    for their scores, which tell whether one of them gains.
 
     Parameters
     ----------
@@ -42,30 +45,21 @@ def followed(pair: PairOfMaps, known: Match, config: MergeConfig) -> Match:
     Match
         The placement, kept to the bit unless the maps say that it has moved; it may be refused.
     """
-    if known.target_from_source is None:
+    if known.target_from_source is None or known.scores is None:
         raise ValueError("there is no placement to follow")
     start = pair.between_grids(known.target_from_source)
     best = _aligned(pair, start, config)
-    rivals = _gained(pair, known.rivals, config)
-    fit, scores = fit_and_scores(pair, best, config)
-    others = [rival.fit for rival in rivals if rival.fit is not None]
-    fits = [fit, *others]
-    odds = [log_odds_of(each) for each in fits]
-    cues = Cues(fit, contest(fits, odds))
-    sure = confidence(cues.contest, config.tries)
-    reason = judge(scores, cues, sure, config.verify)
+    others = [pair.between_grids(rival.target_from_source) for rival in known.rivals]
+    scores, scores_m = _estimated(pair, poses_of([best, *others]), known.scores, config)
+    reason = held(scores, config.verify)
+    is_allowed = bool(pair.allowed(poses_of([best])).all())
     return replace(
         known,
         target_from_source=known.target_from_source if best == start else pair.between_maps(best),
         scores=scores,
-        accepted=reason.code is ReasonCode.ACCEPTED and bool(pair.allowed(poses_of([best])).all()),
+        accepted=is_allowed and reason.code is ReasonCode.ACCEPTED,
         reason=reason,
-        confidence=sure,
-        cues=cues,
-        rivals=tuple(
-            replace(rival, likelihood=times_as_likely(value - odds[0]))
-            for rival, value in zip(rivals, odds[1:], strict=True)
-        ),
+        rivals=tuple(replace(rival, score_m=score_m) for rival, score_m in zip(known.rivals, scores_m, strict=True)),
     )
 
 
@@ -87,17 +81,22 @@ def _moved_m(one: Sim2, other: Sim2, points_m: Points) -> float:
     return float(np.sqrt(np.mean(np.square(x[0] - x[1]) + np.square(y[0] - y[1])))) if len(points_m) else 0.0
 
 
-def _gained(pair: PairOfMaps, rivals: tuple[Rival, ...], config: MergeConfig) -> list[Rival]:
-    """Return the rivals with their scores as they are now."""
-    known = [rival for rival in rivals if rival.fit is not None]
-    if not known:
-        return []
-    poses = poses_of([pair.between_grids(rival.target_from_source) for rival in known])
-    found = scored(pair, poses, config)
-    scores = {pose.tobytes(): float(score_m) for pose, score_m in zip(found.poses, found.scores_m, strict=True)}
-    return [_with_score(rival, scores[pose.tobytes()]) for rival, pose in zip(known, poses, strict=True)]
-
-
-def _with_score(rival: Rival, score_m: float) -> Rival:
-    fit: Fit | None = None if rival.fit is None else replace(rival.fit, score_m=score_m)
-    return replace(rival, score_m=score_m, fit=fit)
+def _estimated(pair: PairOfMaps, poses: Poses, before: Scores, config: MergeConfig) -> tuple[Scores, tuple[float, ...]]:
+    """Return the scores of the first placement, and what the others are ranked by."""
+    target, source, most = pair.target.map, pair.source.map, config.refine.probes
+    found = agreement(target, source, poses, probe(source, most, most // 2), probe(target, most, most // 2))
+    free_m = evenly(source.free_m, _AREA_POINTS)
+    met = target.classes.ravel()[target.flat_index(placement_of(poses[0]).apply(free_m))] != CELL_UNKNOWN
+    overlap_m2 = float(np.mean(met)) * source.known_area_m2 * float(poses[0, 3]) ** 2 if len(met) else 0.0
+    smaller_m2 = min(target.known_area_m2, source.known_area_m2 * float(poses[0, 3]) ** 2)
+    scores_m = found.score_m(config.verify).tolist()
+    scores = replace(
+        before,
+        score_m=scores_m[0],
+        overlap_m2=overlap_m2,
+        overlap_fraction=min(1.0, overlap_m2 / smaller_m2) if smaller_m2 > 0 else 0.0,
+        wall_agreement=float(min(found.ahead.share[0], found.back.share[0])),
+        matched_wall_m=float(found.ahead.matched_m[0] + found.back.matched_m[0]) / 2,
+        violated_wall_m=float(found.ahead.violated_m[0] + found.back.violated_m[0]) / 2,
+    )
+    return scores, tuple(scores_m[1:])

@@ -26,6 +26,31 @@ def too_little_structure(target: DescribedMap, source: DescribedMap, config: Ver
     return Reason(ReasonCode.TOO_LITTLE_STRUCTURE, message)
 
 
+def lacking(scores: Scores, config: VerifyConfig) -> Reason | None:
+    """Return a refusal if a placement lacks what every accepted one must have, however sure it is otherwise."""
+    for what, found, least, unit in (
+        ("m² of ground", scores.overlap_m2, config.min_overlap_m2, "m²"),
+        ("m of wall", scores.matched_wall_m, config.min_matched_wall_m, "m"),
+    ):
+        if found < least:
+            message = f"the maps share {_down(found, 1):.1f} {what}, less than {least:g} {unit}"
+            return Reason(ReasonCode.TOO_LITTLE_OVERLAP, message)
+    if scores.wall_agreement < config.least_agreement:
+        floor = f"less than {config.least_agreement:.0%}"
+        message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree, {floor}"
+        return Reason(ReasonCode.WALLS_DISAGREE, message)
+    return None
+
+
+def held(scores: Scores, config: VerifyConfig) -> Reason:
+    """Return whether a placement that was accepted still has what it must have."""
+    message = (
+        f"about {scores.overlap_m2:.0f} m² overlap, {_down(scores.wall_agreement, 2):.0%} of the walls there agree, "
+        "followed since it was found"
+    )
+    return lacking(scores, config) or Reason(ReasonCode.ACCEPTED, message)
+
+
 def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig, other_half: Fit | None = None) -> Reason:
     """Return why a placement is accepted or, what speaks most against it first, why not.
 
@@ -38,18 +63,10 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig, o
     other_half
         How the maps fit where they do as well turned by half, see `mapmerge.match.weigh.Weighed.other_half`.
     """
-    for what, found, least, unit in (
-        ("m² of ground", scores.overlap_m2, config.min_overlap_m2, "m²"),
-        ("m of wall", scores.matched_wall_m, config.min_matched_wall_m, "m"),
-    ):
-        if found < least:
-            message = f"the maps share {_down(found, 1):.1f} {what}, less than {least:g} {unit}"
-            return Reason(ReasonCode.TOO_LITTLE_OVERLAP, message)
+    poor = lacking(scores, config)
+    if poor is not None:
+        return poor
     doubt = f"the confidence is {_percent(confidence)}, less than {_percent(config.min_confidence)}"
-    if scores.wall_agreement < config.least_agreement:
-        floor = f"less than {config.least_agreement:.0%}"
-        message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree, {floor}"
-        return Reason(ReasonCode.WALLS_DISAGREE, message)
     # of what is as good as refused already, that says nothing: strangers fit a little in many ways
     if other_half is not None and confidence >= config.witness_confidence:
         areas = f"on {other_half.overlap_m2:.0f} m² instead of {scores.overlap_m2:.0f} m²"

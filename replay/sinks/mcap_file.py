@@ -55,6 +55,7 @@ class McapSink:
         self._robots: tuple[RobotInput, ...] = ()
         self._parts: dict[str, str] = {}
         self._merged: Grid | None = None
+        self._blank: Grid | None = None
         self._last_map_ns: int | None = None
         self._pending_map: tuple[int, Grid] | None = None
         self._pending_report: tuple[int, Report] | None = None
@@ -108,10 +109,10 @@ class McapSink:
 
     def _map(self, stamp_ns: int, merged: Grid | None) -> None:
         """Write the merged map if it changed, at once or, when the last one is too recent, later."""
-        if merged is None and self._merged is not None:
+        if merged is None and self._merged is not None and self._merged is not self._blank:
             # a map that was offered as latched would stand for ever: take it back
-            merged = replace(self._merged, cells=np.full_like(self._merged.cells, UNKNOWN))
-        if merged is not None and merged.cells.size and not (self._merged and merged.same_as(self._merged)):
+            merged = self._blank = replace(self._merged, cells=np.full_like(self._merged.cells, UNKNOWN))
+        if merged is not None and merged.cells.size and merged is not self._merged:
             self._merged = merged
             self._pending_map = (stamp_ns, merged)
         due = self._last_map_ns is None or stamp_ns - self._last_map_ns >= self._options.every_ns
