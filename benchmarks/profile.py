@@ -31,7 +31,7 @@ PARTS: Mapping[str, str] = {
     r"\(replay/sources/": "reading",
     r"\(replay/(codec/de|assemble|arrivals|timeline)": "decoding, putting in order",
     r"\bprepare \(mapmerge/|\(mapmerge/(prepare|walls)\.py": PREPARING,
-    r"\(mapmerge/(match/|align|polish|score|verify|graph|unite)": "matching",
+    r"\(mapmerge/(match/|pairs|jump|watch|align|polish|score|verify|graph|unite)": "matching",
     r"\(mapmerge/fuse": "fusing",
     r"\(mapmerge/merger": "rest of the merger",
     r"\(mapmerge/outcome|\(replay/report|\(json/": "report",
