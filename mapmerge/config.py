@@ -274,10 +274,10 @@ class WatchConfig(Settings):
     overlap_growth: float = 1.5
     agreement_drop: float = 0.05
     likeness_rise: float = 0.1
-    area_growth: float = 1.1
-    longest_wait: int = 16
+    area_growth: float = 1.25
+    longest_wait: int = 64
     hold_cells: float = 0.5
-    jump_share: float = 0.2
+    jump_share: float = 0.05
     least_kept_share: float = 0.5
 
 
