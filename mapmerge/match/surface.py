@@ -17,6 +17,9 @@ from mapmerge.sim2 import Points, Sim2
 Surface = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
+_FEW_TURNS = 16
+"""So many turns of all points take less time than finding those on their hull."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CorrelationSurface:
@@ -156,12 +159,16 @@ def _columns(prepared: PreparedMap) -> Points:
     return np.ascontiguousarray(np.concatenate([prepared.walls_m, prepared.free_m]).T)
 
 
+def _hull(columns_m: Points) -> Points:
+    return cv2.convexHull(columns_m.T.astype(np.float32)).reshape(-1, 2).T.astype(np.float64)
+
+
 def _spans_m(columns_m: Points, turns: Sequence[Sim2]) -> tuple[float, float]:
     """Return the largest width and height of some points, shape (2, N), at any of the turns."""
     if columns_m.size == 0:
         return 0.0, 0.0
-    hull_m = cv2.convexHull(columns_m.T.astype(np.float32)).reshape(-1, 2).astype(np.float64)
-    spans_m = np.array([np.ptp(turn.apply(hull_m), axis=0) for turn in turns]).reshape(-1, 2)
+    points_m = columns_m if len(turns) <= _FEW_TURNS else _hull(columns_m)
+    spans_m = np.array([np.ptp(turn.linear @ points_m, axis=1) for turn in turns]).reshape(-1, 2)
     width_m, height_m = spans_m.max(axis=0, initial=0.0).tolist()
     return width_m, height_m
 
