@@ -99,14 +99,17 @@ def _bent(target: PreparedMap, x: Floats, y: Floats, spacing_m: float, config: S
         shift_x, shift_y = field.at(x, y)
         at_x, at_y = x + shift_x, y + shift_y
         wall = nearest.wall_at(at_x, at_y)
-        error_x, error_y = nearest.x_m[wall] - at_x, nearest.y_m[wall] - at_y
+        error_x, error_y = nearest.x_m.take(wall) - at_x, nearest.y_m.take(wall) - at_y
         square = np.square(error_x) + np.square(error_y)
-        weight = np.where(square <= reach_m**2, spacing_m / (1.0 + square / (0.35 * reach_m) ** 2), 0.0)
+        near = np.flatnonzero(square <= reach_m**2)
+        error_x, error_y, square = error_x[near], error_y[near], square[near]
+        weight = spacing_m / (1.0 + square / (0.35 * reach_m) ** 2)
         # of a straight wall only the shift across it is known: n nᵀ for its normal n
-        cos, sin = nearest.directions[wall].T
+        cos, sin = nearest.directions.take(wall[near], axis=0).T
         xx, xy, yy = 0.5 * weight * (1.0 - cos), -0.5 * weight * sin, 0.5 * weight * (1.0 + cos)
+        squares = index[near]
         sums = [
-            _spread(np.bincount(index, values, rows * cols).reshape(rows, cols).astype(np.float32), config)
+            _spread(np.bincount(squares, values, rows * cols).reshape(rows, cols).astype(np.float32), config)
             for values in (xx, xy, yy, xx * error_x + xy * error_y, xy * error_x + yy * error_y)
         ]
         step_x, step_y = _solved(sums, config.stiffness_m)
