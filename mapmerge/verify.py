@@ -68,7 +68,7 @@ def verified(
     found = _agreement(target, source, target_from_source)
     agree, disagree, both = cell_agreement(target, source, target_from_source)
     cell_m2 = (source.resolution_m * target_from_source.scale) ** 2
-    smaller_m2 = min(target.grid.known_area_m2, source.grid.known_area_m2 * target_from_source.scale**2)
+    smaller_m2 = min(known_area_m2(target), known_area_m2(source) * target_from_source.scale**2)
     ahead, back = found.ahead, found.back
     scores = Scores(
         score_m=float(found.score_m(config)[0]),
@@ -80,6 +80,11 @@ def verified(
         violated_wall_m=float(ahead.violated_m[0] + back.violated_m[0]) / 2,
     )
     return scores, found
+
+
+def known_area_m2(prepared: PreparedMap) -> float:
+    """Return `Grid.known_area_m2` of a prepared map, from its classes, in which the known cells are counted faster."""
+    return cv2.countNonZero(prepared.classes) * prepared.resolution_m**2
 
 
 def _agreement(target: PreparedMap, source: PreparedMap, target_from_source: Sim2) -> Agreement:

@@ -13,6 +13,7 @@ from mapmerge.match.spectrum import Spectra
 from mapmerge.prepare import PreparedMap
 from mapmerge.prior import Prior
 from mapmerge.sim2 import Sim2
+from mapmerge.verify import known_area_m2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +34,8 @@ class DescribedMap:
         It is the smaller one, which costs less. Of copies, the frames decide.
         """
         mine, others = self.map.grid, other.map.grid
-        key, other_key = (mine.known_area_m2, *mine.cells.shape), (others.known_area_m2, *others.cells.shape)
+        key = (known_area_m2(self.map), *mine.cells.shape)
+        other_key = (known_area_m2(other.map), *others.cells.shape)
         if key != other_key:
             return key < other_key
         if not np.array_equal(mine.cells, others.cells):
