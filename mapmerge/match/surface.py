@@ -20,6 +20,9 @@ Indices = NDArray[np.intp]
 _FEW_TURNS = 16
 """So many turns of all points take less time than finding those on their hull."""
 
+_EASY_SIZE = 8
+_NOTHING_M = 1e-3
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CorrelationSurface:
@@ -88,7 +91,7 @@ class TranslationSearch:
         sides_m = [side_m + span_m for side_m, span_m in zip(target.extent_m, spans_m, strict=True)]
         self._cell_m = max(cell_m, target.resolution_m, max(sides_m) / max_side_cells)
         cols, rows = (math.ceil(side_m / self._cell_m) + 4 for side_m in sides_m)
-        self._shape = (cv2.getOptimalDFTSize(rows), cv2.getOptimalDFTSize(cols))
+        self._shape = (_transformed_size(rows), _transformed_size(cols))
         # shifts are cyclic: no source meets the target further up than at its last cell, so that what lies beyond is
         # below the first one
         highest = [math.ceil(side_m / self._cell_m) + 1 for side_m in reversed(target.extent_m)]
@@ -138,9 +141,7 @@ class TranslationSearch:
 
         They are as large as what is on them. Of the points, shape (2, N), so many are walls, and the others free.
         """
-        most_rows, most_cols = self._shape
-        cell = (columns_m * (1.0 / self._cell_m)).astype(np.intp)
-        col, row = np.clip(cell[0], 0, most_cols - 1), np.clip(cell[1], 0, most_rows - 1)
+        col, row = (columns_m * (1.0 / self._cell_m)).astype(np.intp)
         rows, cols = int(row.max(initial=0)) + 1, int(col.max(initial=0)) + 1
         index = row * cols + col
         count = np.bincount(index[:walls], minlength=rows * cols).astype(np.float32).reshape(rows, cols)
@@ -152,6 +153,11 @@ class TranslationSearch:
         padded = np.zeros(self._shape, np.float32)
         padded[: raster.shape[0], : raster.shape[1]] = raster
         return padded
+
+
+def _transformed_size(cells: int) -> int:
+    """Return a size that is transformed fast: products of small numbers, odd ones above all, may take twice as long."""
+    return _EASY_SIZE * int(cv2.getOptimalDFTSize(math.ceil(cells / _EASY_SIZE)))
 
 
 def _columns(prepared: PreparedMap) -> Points:
@@ -186,7 +192,9 @@ def surface_peaks(surface: CorrelationSurface, peak_distance_m: float) -> tuple[
     reach = max(1, round(peak_distance_m / surface.step_m))
     highest = cv2.dilate(surface.values, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
     # flat: of two dimensions it takes ten times as long to find a few among many
-    found = np.flatnonzero((surface.values >= highest) & (surface.values > 0))
+    # where maps do not meet, there is nothing but rounding
+    np.maximum(highest, np.float32(_NOTHING_M), out=highest)
+    found = np.flatnonzero(surface.values >= highest)
     values = surface.values.ravel()[found]
     order = np.argsort(-values, kind="stable")
     rows, cols = np.divmod(found[order], surface.values.shape[1])
