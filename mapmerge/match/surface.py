@@ -191,9 +191,9 @@ def surface_peaks(surface: CorrelationSurface, peak_distance_m: float) -> tuple[
     """
     reach = max(1, round(peak_distance_m / surface.step_m))
     highest = cv2.dilate(surface.values, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
-    # flat: of two dimensions it takes ten times as long to find a few among many
     # where maps do not meet, there is nothing but rounding
     np.maximum(highest, np.float32(_NOTHING_M), out=highest)
+    # flat: of two dimensions it takes ten times as long to find a few among many
     found = np.flatnonzero(surface.values >= highest)
     values = surface.values.ravel()[found]
     order = np.argsort(-values, kind="stable")
