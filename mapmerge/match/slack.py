@@ -7,6 +7,7 @@ two look-alike places lacks are not mended by it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -107,14 +108,18 @@ def _bent(target: PreparedMap, x: Floats, y: Floats, spacing_m: float, config: S
         # of a straight wall only the shift across it is known: n nᵀ for its normal n
         cos, sin = nearest.directions.take(wall[near], axis=0).T
         xx, xy, yy = 0.5 * weight * (1.0 - cos), -0.5 * weight * sin, 0.5 * weight * (1.0 + cos)
-        squares = index[near]
-        sums = [
-            _spread(np.bincount(squares, values, rows * cols).reshape(rows, cols).astype(np.float32), config)
-            for values in (xx, xy, yy, xx * error_x + xy * error_y, xy * error_x + yy * error_y)
-        ]
-        step_x, step_y = _solved(sums, config.stiffness_m)
+        asked = np.stack([xx, xy, yy, xx * error_x + xy * error_y, xy * error_x + yy * error_y], axis=1)
+        step_x, step_y = _solved(_spread(_summed(asked, index[near], (rows, cols)), config), config.stiffness_m)
         field = _limited(field, step_x, step_y, config.most_m)
     return field
+
+
+def _summed(values: Floats, square: NDArray[np.intp], shape: tuple[int, int]) -> Floats:
+    """Return the sums of values, shape (N, K), over what lies in each square, shape (rows, columns, K)."""
+    kinds = values.shape[1]
+    bins = (square * kinds)[:, None] + np.arange(kinds)
+    sums = np.bincount(bins.ravel(), values.ravel(), math.prod(shape) * kinds)
+    return sums.astype(np.float32).reshape(*shape, kinds)
 
 
 def _spread(values: Floats, config: SlackConfig) -> Floats:
@@ -124,9 +129,9 @@ def _spread(values: Floats, config: SlackConfig) -> Floats:
     return np.asarray(blurred * np.float32(2 * np.pi * sigma**2), np.float32)
 
 
-def _solved(sums: list[Floats], stiffness_m: float) -> tuple[Floats, Floats]:
+def _solved(sums: Floats, stiffness_m: float) -> tuple[Floats, Floats]:
     """Solve the normal equations of each square for one step, damped where there is little wall."""
-    xx, xy, yy, right_x, right_y = sums
+    xx, xy, yy, right_x, right_y = np.moveaxis(sums, 2, 0)
     xx, yy = xx + np.float32(stiffness_m), yy + np.float32(stiffness_m)
     determinant = xx * yy - xy * xy
     step_x, step_y = (yy * right_x - xy * right_y) / determinant, (xx * right_y - xy * right_x) / determinant

@@ -122,7 +122,7 @@ class TranslationSearch:
         ahead = [
             CorrelationSurface(
                 turn,
-                np.roll(_correlated(spectra, walls, free, True), self._below, axis=(0, 1)),
+                _rolled(_correlated(spectra, walls, free, True), *self._below),
                 first_m,
                 cell_m,
             )
@@ -202,6 +202,15 @@ def surface_peaks(surface: CorrelationSurface, peak_distance_m: float) -> tuple[
     poses[:, 0], poses[:, 1] = surface.shift_m(rows, cols)
     poses[:, 2:] = surface.turn.yaw_rad, surface.turn.scale
     return poses, values[order]
+
+
+def _rolled(values: Surface, rows: int, cols: int) -> Surface:
+    """Return `numpy.roll` by so many rows and columns, without its overhead, which is most of it for small surfaces."""
+    below, right = values.shape[0] - rows, values.shape[1] - cols
+    rolled = np.empty_like(values)
+    rolled[:rows, :cols], rolled[:rows, cols:] = values[below:, right:], values[below:, :right]
+    rolled[rows:, :cols], rolled[rows:, cols:] = values[:below, right:], values[:below, :right]
+    return rolled
 
 
 def _correlated(target: tuple[Surface, Surface], walls: Surface, free: Surface, conjugate: bool) -> Surface:
