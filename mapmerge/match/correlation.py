@@ -26,7 +26,7 @@ from mapmerge.match.candidates import all_scales, by_half_turn, by_prior, by_spe
 from mapmerge.match.confidence import confidence, times_as_likely
 from mapmerge.match.cues import Cues, Fit
 from mapmerge.match.explain import explained
-from mapmerge.match.look import Look, beside, look, rivals
+from mapmerge.match.look import Look, look, look_around, rivals
 from mapmerge.match.pair import DescribedMap, PairOfMaps
 from mapmerge.match.spectrum import orientation_spectra
 from mapmerge.match.verdict import contradicted, is_far_likelier, judge, too_little_structure, within
@@ -152,8 +152,7 @@ def _around_best(pair: PairOfMaps, seen: Look, scales: tuple[float, float], conf
 
 def _around(pair: PairOfMaps, pose: Poses, scales: tuple[float, float], config: MergeConfig) -> Look:
     """Return what competes with a placement, shape (1, 4), and is easily overlooked: beside it, and turned by 180°."""
-    near = beside(pair, pose, scales, config)
-    return near.joined(look(pair, by_half_turn(pair, placement_of(pose[0]), config.search), scales, config))
+    return look_around(pair, pose, by_half_turn(pair, placement_of(pose[0]), config.search), scales, config)
 
 
 def _apart(pair: PairOfMaps, seen: Look, config: MergeConfig) -> Look:
