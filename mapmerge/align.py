@@ -18,6 +18,8 @@ from mapmerge.sim2 import Points, Sim2
 Poses = NDArray[np.float64]
 """Placements ``target_from_source`` of one pair between its grid frames, shape (C, 4): x_m, y_m, yaw_rad, scale."""
 
+Complex = NDArray[np.complex128]
+
 _MIN_PAIRS = 12
 _CAUCHY = 0.35
 
@@ -60,17 +62,24 @@ def placed(poses: Poses, points_m: Points) -> tuple[NDArray[np.float32], NDArray
     """Return x and y of points, shape (N, 2), at each of the placements, each of shape (C, N)."""
     columns = np.ones((3, len(points_m)), np.float32)
     columns[:2] = points_m.T
-    x, y = (_placing(poses).reshape(-1, 3).astype(np.float32) @ columns).reshape(2, len(poses), len(points_m))
+    place, turn = poses[:, 0] + 1j * poses[:, 1], poses[:, 3] * np.exp(1j * poses[:, 2])
+    x, y = (_placing(place, turn).reshape(-1, 3).astype(np.float32) @ columns).reshape(2, len(poses), len(points_m))
     return x, y
 
 
-def _placing(poses: Poses) -> NDArray[np.float64]:
-    """Return what x, y and 1 of a point are multiplied with for its place, shape (2, C, 3): x there, and y."""
-    rows = np.empty((2, len(poses), 3))
-    rows[0, :, 0] = rows[1, :, 1] = poses[:, 3] * np.cos(poses[:, 2])
-    rows[1, :, 0] = poses[:, 3] * np.sin(poses[:, 2])
-    rows[0, :, 1] = -rows[1, :, 0]
-    rows[:, :, 2] = poses[:, :2].T
+def _placing(place: Complex, turn: Complex) -> NDArray[np.float64]:
+    """Return what x, y and 1 of a point are multiplied with for its place, shape (2, C, 3): x there, and y.
+
+    Parameters
+    ----------
+    place
+        Where the points' origin is placed, x + iy, shape (C,).
+    turn
+        The scale times the turn, as a complex number, shape (C,).
+    """
+    rows = np.empty((2, len(place), 3))
+    rows[0, :, 0], rows[0, :, 1], rows[0, :, 2] = turn.real, -turn.imag, place.real
+    rows[1, :, 0], rows[1, :, 1], rows[1, :, 2] = turn.imag, turn.real, place.imag
     return rows
 
 
@@ -107,13 +116,15 @@ def align(
     """
     if len(walls_m) == 0 or len(target.walls_m) == 0 or len(starts) == 0:
         return starts.copy()
-    middle_m = walls_m.mean(axis=0)
-    points, walls = _points(walls_m - middle_m), _Walls.of(target.nearest)
-    to_middle = np.array([[*middle_m, 0.0, 1.0]])
-    poses = composed(starts, to_middle)
+    x_m, y_m = walls_m.mean(axis=0).tolist()
+    points, walls = _points(walls_m - (x_m, y_m)), _Walls.of(target.nearest)
+    turn = starts[:, 3] * np.exp(1j * starts[:, 2])
+    place = starts[:, 0] + 1j * starts[:, 1] + turn * complex(x_m, y_m)
     for distance_m in reject_m:
-        poses = _moved(poses, _pairs(walls, points, poses, distance_m), scales)
-    return composed(poses, inverses(to_middle))
+        place, turn = _moved(place, turn, _pairs(walls, points, place, turn, distance_m), scales)
+    place -= turn * complex(x_m, y_m)
+    size = np.abs(turn) if scales[0] < scales[1] else starts[:, 3]
+    return np.stack([place.real, place.imag, np.angle(turn), size], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,71 +178,67 @@ class _Walls:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pairs:
-    """Sums over the pairs of a point and its nearest wall, of each of C placements.
+    """Weighted means over the pairs of a point and its nearest wall, of each of C placements: shape (C,) each.
+
+    Points and errors are complex, x + iy; points are in the source's frame, about the middle of all, errors are the way
+    to the wall, in the target's.
 
     Parameters
     ----------
     enough
-        Whether there are enough pairs, shape (C,).
-    arms
-        Means of 1, x, y and x² + y² of the points, shape (C, 4).
-    error_x, error_y
-        Means of how far the wall is from the point, by itself and times x and y of the point, shape (C, 3) each.
+        Whether there are enough pairs.
+    point, square
+        Of the points, and of the square of how far they are from the middle.
+    error, pull
+        Of the errors, and of each times its point, conjugate.
     """
 
     enough: NDArray[np.bool_]
-    arms: NDArray[np.float64]
-    error_x: NDArray[np.float64]
-    error_y: NDArray[np.float64]
+    point: Complex
+    square: NDArray[np.float64]
+    error: Complex
+    pull: Complex
 
 
-def _pairs(walls: _Walls, points: _Points, poses: Poses, reject_m: float) -> _Pairs:
+def _pairs(walls: _Walls, points: _Points, place: Complex, turn: Complex, reject_m: float) -> _Pairs:
     """Pair each point with its nearest wall, unless that is too far away."""
-    in_m = _placing(poses)
+    # one product for all placements of all points, in metres and in cells of the look-up
+    in_m = _placing(place, turn)
     in_cells = in_m / walls.cell_m
     in_cells[:, :, 2] -= np.array(walls.corner_m)[:, None] / walls.cell_m
-    # one product for all placements of all points, in metres and in cells of the look-up
-    placing = np.concatenate([in_m, in_cells])
-    x, y, col, row = (placing.reshape(-1, 3).astype(np.float32) @ points.columns).reshape(
-        4, len(poses), len(points.powers)
-    )
+    placing = np.concatenate([in_m, in_cells]).astype(np.float32)
+    shape = len(place), len(points.powers)
+    x, y, col, row = (placing.reshape(-1, 3) @ points.columns).reshape(4, *shape)
     nearest = walls.at(col, row)
-    error_x, error_y = nearest.real - x, nearest.imag - y
+    weighted = np.empty((3, *shape), np.float32)
+    weight, error_x, error_y = weighted
+    np.subtract(nearest.real, x, out=error_x)
+    np.subtract(nearest.imag, y, out=error_y)
     square = error_x * error_x + error_y * error_y
     is_near = (square <= np.float32(reject_m * reject_m)).astype(np.float32)
     # Cauchy weights: what is far apart says less
     square *= np.float32(1.0 / (_CAUCHY * reject_m) ** 2)
     square += np.float32(1.0)
-    weight = np.divide(is_near, square, out=square)
-    powers = points.powers
-    arms = (weight @ powers).astype(np.float64)
-    enough = is_near @ powers[:, 0] >= _MIN_PAIRS
-    total = np.where(enough, arms[:, 0], 1.0)[:, None]
-    error_x *= weight
-    error_y *= weight
-    return _Pairs(enough, arms / total, (error_x @ powers[:, :3]) / total, (error_y @ powers[:, :3]) / total)
+    np.divide(is_near, square, out=weight)
+    weighted[1:] *= weight
+    sums = (weighted.reshape(-1, shape[1]) @ points.powers).astype(np.float64).reshape(3, shape[0], 4)
+    enough = is_near @ points.powers[:, 0] >= _MIN_PAIRS
+    total = np.where(enough, sums[0, :, 0], 1.0)
+    (_, arm_x, arm_y, arm_square), (along_x, xx, yx, _), (along_y, xy, yy, _) = np.moveaxis(sums, 2, 1) / total
+    return _Pairs(enough, arm_x + 1j * arm_y, arm_square, along_x + 1j * along_y, xx + yy + 1j * (xy - yx))
 
 
-def _moved(poses: Poses, pairs: _Pairs, scales: tuple[float, float]) -> Poses:
-    """Return the poses moved by the motion that brings the pairs together."""
-    cos, sin = poses[:, 3] * np.cos(poses[:, 2]), poses[:, 3] * np.sin(poses[:, 2])
-    _, middle_x, middle_y, square = pairs.arms.T
-    (shift_x, xx, yx), (shift_y, xy, yy) = pairs.error_x.T, pairs.error_y.T
-    # of points about their weighted mean
-    xx, yx, xy, yy = xx - middle_x * shift_x, yx - middle_y * shift_x, xy - middle_x * shift_y, yy - middle_y * shift_y
-    cross = cos * (xy - yx) - sin * (xx + yy)
-    along = cos * (xx + yy) + sin * (xy - yx)
-    spread = np.maximum(poses[:, 3] ** 2 * (square - middle_x**2 - middle_y**2), 1e-9)
-    turn = np.where(pairs.enough, np.arctan2(cross, spread + along), 0.0)
-    moved = poses.copy()
-    growth = np.ones(len(poses))
+def _moved(place: Complex, turn: Complex, pairs: _Pairs, scales: tuple[float, float]) -> tuple[Complex, Complex]:
+    """Return the placements moved by the motion that brings the pairs together."""
+    # of points about their weighted mean, turned as they are
+    arm = turn * pairs.point
+    pull = turn.conj() * (pairs.pull - pairs.point.conj() * pairs.error)
+    size = np.abs(turn)
+    spread = np.maximum(size**2 * (pairs.square - np.abs(pairs.point) ** 2), 1e-9)
+    factor = (spread + pull) / spread
+    growth = np.abs(factor)
+    factor /= np.where(growth > 0.0, growth, 1.0)
     if scales[0] < scales[1]:
-        factor = np.hypot(cross, spread + along) / spread
-        moved[:, 3] = np.where(pairs.enough, np.clip(poses[:, 3] * factor, *scales), poses[:, 3])
-        growth = moved[:, 3] / poses[:, 3]
-    arm_x, arm_y = cos * middle_x - sin * middle_y, sin * middle_x + cos * middle_y
-    turn_cos, turn_sin = growth * np.cos(turn), growth * np.sin(turn)
-    moved[:, 0] += np.where(pairs.enough, shift_x + arm_x - turn_cos * arm_x + turn_sin * arm_y, 0.0)
-    moved[:, 1] += np.where(pairs.enough, shift_y + arm_y - turn_sin * arm_x - turn_cos * arm_y, 0.0)
-    moved[:, 2] += turn
-    return moved
+        factor *= np.clip(size * growth, *scales) / size
+    moved = place + arm + pairs.error - factor * arm
+    return np.where(pairs.enough, moved, place), np.where(pairs.enough, factor * turn, turn)

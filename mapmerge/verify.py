@@ -17,6 +17,8 @@ from mapmerge.prepared import CELL_FREE, CELL_OCCUPIED, CELL_UNKNOWN, PreparedMa
 from mapmerge.score import Agreement, agreement, probe
 from mapmerge.sim2 import Sim2
 
+_CLASSES = 4
+
 
 @dataclass(frozen=True, slots=True)
 class Scores:
@@ -66,7 +68,7 @@ def verified(
     found = _agreement(target, source, target_from_source)
     agree, disagree, both = cell_agreement(target, source, target_from_source)
     cell_m2 = (source.resolution_m * target_from_source.scale) ** 2
-    smaller_m2 = min(target.grid.known_area_m2, source.grid.known_area_m2 * target_from_source.scale**2)
+    smaller_m2 = min(target.known_area_m2, source.known_area_m2 * target_from_source.scale**2)
     ahead, back = found.ahead, found.back
     scores = Scores(
         score_m=float(found.score_m(config)[0]),
@@ -99,18 +101,36 @@ def cell_agreement(target: PreparedMap, source: PreparedMap, target_from_source:
     in_cells = replace(
         pose, x_m=pose.x_m / target.resolution_m, y_m=pose.y_m / target.resolution_m, scale=pose.scale / ratio
     )
-    matrix = (half.inverse() @ in_cells @ half).matrix[:2]
-    rows, cols = source.classes.shape
+    part = _where_both_are(in_cells.inverse(), target.classes.shape, source.classes.shape)
+    here = source.classes[part]
+    if here.size == 0:
+        return 0, 0, 0
+    matrix = (half.inverse() @ in_cells @ Sim2(part[1].start, part[0].start) @ half).matrix[:2]
     there = cv2.warpAffine(
         target.classes,
         matrix,
-        (cols, rows),
+        here.shape[::-1],
         flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_CONSTANT,
         borderValue=CELL_UNKNOWN,
     )
-    counts = np.bincount((source.classes * np.uint8(4) + there).ravel(), minlength=16).reshape(4, 4)
-    agree = counts[CELL_FREE, CELL_FREE] + counts[CELL_OCCUPIED, CELL_OCCUPIED]
-    disagree = counts[CELL_FREE, CELL_OCCUPIED] + counts[CELL_OCCUPIED, CELL_FREE]
-    known = counts[1:, 1:].sum()
-    return int(agree), int(disagree), int(known)
+    both = here * np.uint8(_CLASSES) + there
+
+    def count(one: int, other: int) -> int:
+        return int(np.count_nonzero(both == np.uint8(one * _CLASSES + other)))
+
+    agree = count(CELL_FREE, CELL_FREE) + count(CELL_OCCUPIED, CELL_OCCUPIED)
+    disagree = count(CELL_FREE, CELL_OCCUPIED) + count(CELL_OCCUPIED, CELL_FREE)
+    known = int(np.count_nonzero(np.minimum(here, there) != CELL_UNKNOWN))
+    return agree, disagree, known
+
+
+def _where_both_are(
+    source_from_target: Sim2, target_shape: tuple[int, ...], source_shape: tuple[int, ...]
+) -> tuple[slice, slice]:
+    """Return the rows and columns of the source, in cells, outside of which no cell of the target lies."""
+    rows, cols = target_shape
+    corners = source_from_target.apply(np.array([(0, 0), (cols, 0), (0, rows), (cols, rows)], np.float64))
+    low = np.clip(np.floor(corners.min(axis=0)) - 1, 0, source_shape[::-1]).astype(int).tolist()
+    high = np.clip(np.ceil(corners.max(axis=0)) + 1, 0, source_shape[::-1]).astype(int).tolist()
+    return slice(low[1], high[1]), slice(low[0], high[0])

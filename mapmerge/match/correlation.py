@@ -28,7 +28,7 @@ from mapmerge.match.confidence import confidence, times_as_likely
 from mapmerge.match.cues import Cues, Fit
 from mapmerge.match.explain import explained
 from mapmerge.match.follow import followed
-from mapmerge.match.look import Look, beside, look, rivals
+from mapmerge.match.look import Look, look, look_around, rivals
 from mapmerge.match.pair import DescribedMap, PairOfMaps, ordered
 from mapmerge.match.verdict import contradicted, is_far_likelier, judge, too_little_structure, within
 from mapmerge.match.weigh import Weighed, weighed
@@ -149,12 +149,16 @@ def _search(pair: PairOfMaps, rotations: tuple[float, ...], config: MergeConfig)
         starts = by_prior(pair, config.search)
         if steps != (1.0,):
             starts = np.vstack([starts, by_spectra(pair, rotations, steps, config.search)])
-        return _ranked(pair, look(pair, starts, scales, config), scales, config)
+        seen = look(pair, starts, scales, config)
+        return _apart(pair, seen.joined(_around_best(pair, seen, scales, config)), config)
     seen = look(pair, by_spectra(pair, rotations, steps, config.search), scales, config)
-    ranked = _ranked(pair, seen, scales, config)
+    around = _around_best(pair, seen, scales, config)
+    ranked = _apart(pair, seen.joined(around), config)
     if not _is_clear(ranked, config) and scales[0] <= 1.0 <= scales[1]:
-        again = look(pair, by_sweep(pair, config.search), scales, config)
-        ranked = _ranked(pair, seen.joined(again), scales, config)
+        both = seen.joined(look(pair, by_sweep(pair, config.search), scales, config))
+        if not np.array_equal(both.poses[:1], seen.poses[:1]):
+            around = _around_best(pair, both, scales, config)
+        ranked = _apart(pair, both.joined(around), config)
     return ranked
 
 
@@ -167,21 +171,20 @@ def _scales(pair: PairOfMaps, config: MergeConfig) -> tuple[tuple[float, float],
     return limits, all_scales(*limits, config.search.scale_step)
 
 
-def _ranked(pair: PairOfMaps, seen: Look, scales: tuple[float, float], config: MergeConfig) -> Look:
-    """Return the best placement, then its rivals; nothing if there is no placement at all."""
-    if len(seen.poses) == 0:
-        return seen
-    return _apart(pair, seen.joined(_around(pair, seen.poses[:1], scales, config)), config)
+def _around_best(pair: PairOfMaps, seen: Look, scales: tuple[float, float], config: MergeConfig) -> Look:
+    """Return what competes with the best of some placements; nothing if there is none."""
+    return _around(pair, seen.poses[:1], scales, config) if len(seen.poses) else seen
 
 
 def _around(pair: PairOfMaps, pose: Poses, scales: tuple[float, float], config: MergeConfig) -> Look:
     """Return what competes with a placement, shape (1, 4), and is easily overlooked: beside it, and turned by 180°."""
-    near = beside(pair, pose, scales, config)
-    return near.joined(look(pair, by_half_turn(pair, placement_of(pose[0]), config.search), scales, config))
+    return look_around(pair, pose, by_half_turn(pair, placement_of(pose[0]), config.search), scales, config)
 
 
 def _apart(pair: PairOfMaps, seen: Look, config: MergeConfig) -> Look:
-    """Return the best placement and those that differ from it and from all better ones."""
+    """Return the best placement, then its rivals, which differ from it and from all better ones."""
+    if len(seen.poses) == 0:
+        return seen
     best, others = seen.rows(slice(0, 1)), seen.rows(slice(1, None))
     return best.followed_by(rivals(best, others, pair, config.verify))
 

@@ -77,9 +77,53 @@ def look(pair: PairOfMaps, starts: Poses, scales: tuple[float, float], config: M
     config
         Settings.
     """
+    return _closely(pair, _roughly(pair, starts, scales, config), scales, config)
+
+
+def look_around(pair: PairOfMaps, pose: Poses, others: Poses, scales: tuple[float, float], config: MergeConfig) -> Look:
+    """Return what is found from starts beside a placement, and from other starts as `look` does.
+
+    Along walls without an end the score has a ridge but no second peak, so that no peak of a surface is a rival there.
+
+    Parameters
+    ----------
+    pair
+        The maps.
+    pose
+        The placement, shape (1, 4).
+    others
+        Where else to begin, shape (C, 4).
+    scales
+        Least and largest scale.
+    config
+        Settings.
+    """
+    found = _roughly(pair, np.vstack([beside(pose, config.verify), others]), scales, config)
+    near, far = found[:_BESIDE_TURNS], found[_BESIDE_TURNS:]
+    near = near[_is_possible(pair, near, scales)]
+    return scored(pair, near, config).joined(_closely(pair, far, scales, config))
+
+
+def beside(pose: Poses, config: VerifyConfig) -> Poses:
+    """Return starts all around a placement, shape (1, 4), a little further away than what is not distinct from it."""
+    reach_m = _BESIDE * config.distinct_m
+    angles = np.arange(_BESIDE_TURNS) * math.tau / _BESIDE_TURNS
+    starts = np.repeat(pose, _BESIDE_TURNS, axis=0)
+    starts[:, 0] += reach_m * np.cos(angles)
+    starts[:, 1] += reach_m * np.sin(angles)
+    return starts
+
+
+def _roughly(pair: PairOfMaps, starts: Poses, scales: tuple[float, float], config: MergeConfig) -> Poses:
+    limits = config.refine
+    walls_m = evenly(pair.source.map.walls_m, limits.rough_points)
+    return align(pair.target.map, walls_m, starts, limits.rough_reject_m, scales=scales)
+
+
+def _closely(pair: PairOfMaps, poses: Poses, scales: tuple[float, float], config: MergeConfig) -> Look:
+    """Return the best of some placements that are aligned roughly, aligned well."""
     target, source, limits = pair.target.map, pair.source.map, config.refine
-    poses = align(target, evenly(source.walls_m, limits.rough_points), starts, limits.rough_reject_m, scales=scales)
-    poses = poses[pair.allowed(poses) & _has_scale(poses, scales)]
+    poses = poses[_is_possible(pair, poses, scales)]
     if len(poses) == 0:
         return scored(pair, poses, config)
     few = limits.rough_probes
@@ -87,30 +131,13 @@ def look(pair: PairOfMaps, starts: Poses, scales: tuple[float, float], config: M
     poses = poses[np.argsort(-rough.score_m(config.verify), kind="stable")]
     poses = poses[distinct(poses, source.walls_m, _SAME_M, _SAME_RAD, limits.survivors)]
     poses = align(target, evenly(source.walls_m, limits.points), poses, limits.reject_m, scales=scales)
-    poses = poses[pair.allowed(poses) & _has_scale(poses, scales)]
-    return scored(pair, poses, config)
+    return scored(pair, poses[_is_possible(pair, poses, scales)], config)
 
 
-def beside(pair: PairOfMaps, pose: Poses, scales: tuple[float, float], config: MergeConfig) -> Look:
-    """Return what is found from starts beside a placement, shape (1, 4).
-
-    Along walls without an end the score has a ridge but no second peak, so that no peak of a surface is a rival there.
-    """
-    reach_m = _BESIDE * config.verify.distinct_m
-    angles = np.arange(_BESIDE_TURNS) * math.tau / _BESIDE_TURNS
-    starts = np.repeat(pose, _BESIDE_TURNS, axis=0)
-    starts[:, 0] += reach_m * np.cos(angles)
-    starts[:, 1] += reach_m * np.sin(angles)
-    limits = config.refine
-    walls_m = evenly(pair.source.map.walls_m, limits.rough_points)
-    poses = align(pair.target.map, walls_m, starts, limits.rough_reject_m, scales=scales)
-    poses = poses[pair.allowed(poses) & _has_scale(poses, scales)]
-    return scored(pair, poses, config)
-
-
-def _has_scale(poses: Poses, scales: tuple[float, float]) -> NDArray[np.bool_]:
-    """Tell which placements have a scale within the limits; where to begin, some may not."""
-    return np.asarray((poses[:, 3] >= scales[0] - _ROUNDING) & (poses[:, 3] <= scales[1] + _ROUNDING), np.bool_)
+def _is_possible(pair: PairOfMaps, poses: Poses, scales: tuple[float, float]) -> NDArray[np.bool_]:
+    """Tell which placements are allowed, and have a scale within the limits; where to begin, some may not."""
+    has_scale = (poses[:, 3] >= scales[0] - _ROUNDING) & (poses[:, 3] <= scales[1] + _ROUNDING)
+    return np.asarray(pair.allowed(poses) & has_scale, np.bool_)
 
 
 def scored(pair: PairOfMaps, poses: Poses, config: MergeConfig) -> Look:

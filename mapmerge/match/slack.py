@@ -7,6 +7,7 @@ two look-alike places lacks are not mended by it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -99,19 +100,26 @@ def _bent(target: PreparedMap, x: Floats, y: Floats, spacing_m: float, config: S
         shift_x, shift_y = field.at(x, y)
         at_x, at_y = x + shift_x, y + shift_y
         wall = nearest.wall_at(at_x, at_y)
-        error_x, error_y = nearest.x_m[wall] - at_x, nearest.y_m[wall] - at_y
+        error_x, error_y = nearest.x_m.take(wall) - at_x, nearest.y_m.take(wall) - at_y
         square = np.square(error_x) + np.square(error_y)
-        weight = np.where(square <= reach_m**2, spacing_m / (1.0 + square / (0.35 * reach_m) ** 2), 0.0)
+        near = np.flatnonzero(square <= reach_m**2)
+        error_x, error_y, square = error_x[near], error_y[near], square[near]
+        weight = spacing_m / (1.0 + square / (0.35 * reach_m) ** 2)
         # of a straight wall only the shift across it is known: n nᵀ for its normal n
-        cos, sin = nearest.directions[wall].T
+        cos, sin = nearest.directions.take(wall[near], axis=0).T
         xx, xy, yy = 0.5 * weight * (1.0 - cos), -0.5 * weight * sin, 0.5 * weight * (1.0 + cos)
-        sums = [
-            _spread(np.bincount(index, values, rows * cols).reshape(rows, cols).astype(np.float32), config)
-            for values in (xx, xy, yy, xx * error_x + xy * error_y, xy * error_x + yy * error_y)
-        ]
-        step_x, step_y = _solved(sums, config.stiffness_m)
+        asked = np.stack([xx, xy, yy, xx * error_x + xy * error_y, xy * error_x + yy * error_y], axis=1)
+        step_x, step_y = _solved(_spread(_summed(asked, index[near], (rows, cols)), config), config.stiffness_m)
         field = _limited(field, step_x, step_y, config.most_m)
     return field
+
+
+def _summed(values: Floats, square: NDArray[np.intp], shape: tuple[int, int]) -> Floats:
+    """Return the sums of values, shape (N, K), over what lies in each square, shape (rows, columns, K)."""
+    kinds = values.shape[1]
+    bins = (square * kinds)[:, None] + np.arange(kinds)
+    sums = np.bincount(bins.ravel(), values.ravel(), math.prod(shape) * kinds)
+    return sums.astype(np.float32).reshape(*shape, kinds)
 
 
 def _spread(values: Floats, config: SlackConfig) -> Floats:
@@ -121,9 +129,9 @@ def _spread(values: Floats, config: SlackConfig) -> Floats:
     return np.asarray(blurred * np.float32(2 * np.pi * sigma**2), np.float32)
 
 
-def _solved(sums: list[Floats], stiffness_m: float) -> tuple[Floats, Floats]:
+def _solved(sums: Floats, stiffness_m: float) -> tuple[Floats, Floats]:
     """Solve the normal equations of each square for one step, damped where there is little wall."""
-    xx, xy, yy, right_x, right_y = sums
+    xx, xy, yy, right_x, right_y = np.moveaxis(sums, 2, 0)
     xx, yy = xx + np.float32(stiffness_m), yy + np.float32(stiffness_m)
     determinant = xx * yy - xy * xy
     step_x, step_y = (yy * right_x - xy * right_y) / determinant, (xx * right_y - xy * right_x) / determinant

@@ -12,12 +12,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from mapmerge.align import evenly
 from mapmerge.sim2 import Points
 
 Spectrum = NDArray[np.float64]
 Spectra = NDArray[np.float64]
 
 _AT_ONCE = 1 << 15
+_ENOUGH_WALLS = 10_000
 
 
 def orientation_spectra(walls_m: Points, angle_step_rad: float, bin_m: float) -> Spectra:
@@ -29,13 +31,14 @@ def orientation_spectra(walls_m: Points, angle_step_rad: float, bin_m: float) ->
     Parameters
     ----------
     walls_m
-        Wall points, shape (N, 2).
+        Wall points, shape (N, 2). Of very many, some that are evenly spread are as good.
     angle_step_rad
         Step of the angles; rounded so that a whole number of steps makes π.
     bin_m
         Width of a bin of the projections.
     """
     angles = max(1, round(np.pi / angle_step_rad))
+    walls_m = evenly(walls_m, _ENOUGH_WALLS)
     if len(walls_m) < 2:
         return np.zeros((2, angles))
     centred = (walls_m - walls_m.mean(axis=0)) / bin_m

@@ -17,6 +17,12 @@ from mapmerge.sim2 import Points, Sim2
 Surface = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
+_FEW_TURNS = 16
+"""So many turns of all points take less time than finding those on their hull."""
+
+_EASY_SIZE = 8
+_NOTHING_M = 1e-3
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CorrelationSurface:
@@ -85,7 +91,7 @@ class TranslationSearch:
         sides_m = [side_m + span_m for side_m, span_m in zip(target.extent_m, spans_m, strict=True)]
         self._cell_m = max(cell_m, target.resolution_m, max(sides_m) / max_side_cells)
         cols, rows = (math.ceil(side_m / self._cell_m) + 4 for side_m in sides_m)
-        self._shape = (cv2.getOptimalDFTSize(rows), cv2.getOptimalDFTSize(cols))
+        self._shape = (_transformed_size(rows), _transformed_size(cols))
         # shifts are cyclic: no source meets the target further up than at its last cell, so that what lies beyond is
         # below the first one
         highest = [math.ceil(side_m / self._cell_m) + 1 for side_m in reversed(target.extent_m)]
@@ -116,7 +122,7 @@ class TranslationSearch:
         ahead = [
             CorrelationSurface(
                 turn,
-                np.roll(_correlated(spectra, walls, free, True), self._below, axis=(0, 1)),
+                _rolled(_correlated(spectra, walls, free, True), *self._below),
                 first_m,
                 cell_m,
             )
@@ -135,9 +141,7 @@ class TranslationSearch:
 
         They are as large as what is on them. Of the points, shape (2, N), so many are walls, and the others free.
         """
-        most_rows, most_cols = self._shape
-        cell = (columns_m * (1.0 / self._cell_m)).astype(np.intp)
-        col, row = np.clip(cell[0], 0, most_cols - 1), np.clip(cell[1], 0, most_rows - 1)
+        col, row = (columns_m * (1.0 / self._cell_m)).astype(np.intp)
         rows, cols = int(row.max(initial=0)) + 1, int(col.max(initial=0)) + 1
         index = row * cols + col
         count = np.bincount(index[:walls], minlength=rows * cols).astype(np.float32).reshape(rows, cols)
@@ -151,17 +155,26 @@ class TranslationSearch:
         return padded
 
 
+def _transformed_size(cells: int) -> int:
+    """Return a size that is transformed fast: products of small numbers, odd ones above all, may take twice as long."""
+    return _EASY_SIZE * int(cv2.getOptimalDFTSize(math.ceil(cells / _EASY_SIZE)))
+
+
 def _columns(prepared: PreparedMap) -> Points:
     """Return the points on walls, then those in free space, shape (2, N)."""
     return np.ascontiguousarray(np.concatenate([prepared.walls_m, prepared.free_m]).T)
+
+
+def _hull(columns_m: Points) -> Points:
+    return cv2.convexHull(columns_m.T.astype(np.float32)).reshape(-1, 2).T.astype(np.float64)
 
 
 def _spans_m(columns_m: Points, turns: Sequence[Sim2]) -> tuple[float, float]:
     """Return the largest width and height of some points, shape (2, N), at any of the turns."""
     if columns_m.size == 0:
         return 0.0, 0.0
-    hull_m = cv2.convexHull(columns_m.T.astype(np.float32)).reshape(-1, 2).astype(np.float64)
-    spans_m = np.array([np.ptp(turn.apply(hull_m), axis=0) for turn in turns]).reshape(-1, 2)
+    points_m = columns_m if len(turns) <= _FEW_TURNS else _hull(columns_m)
+    spans_m = np.array([np.ptp(turn.linear @ points_m, axis=1) for turn in turns]).reshape(-1, 2)
     width_m, height_m = spans_m.max(axis=0, initial=0.0).tolist()
     return width_m, height_m
 
@@ -178,8 +191,10 @@ def surface_peaks(surface: CorrelationSurface, peak_distance_m: float) -> tuple[
     """
     reach = max(1, round(peak_distance_m / surface.step_m))
     highest = cv2.dilate(surface.values, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
+    # where maps do not meet, there is nothing but rounding
+    np.maximum(highest, np.float32(_NOTHING_M), out=highest)
     # flat: of two dimensions it takes ten times as long to find a few among many
-    found = np.flatnonzero((surface.values >= highest) & (surface.values > 0))
+    found = np.flatnonzero(surface.values >= highest)
     values = surface.values.ravel()[found]
     order = np.argsort(-values, kind="stable")
     rows, cols = np.divmod(found[order], surface.values.shape[1])
@@ -187,6 +202,15 @@ def surface_peaks(surface: CorrelationSurface, peak_distance_m: float) -> tuple[
     poses[:, 0], poses[:, 1] = surface.shift_m(rows, cols)
     poses[:, 2:] = surface.turn.yaw_rad, surface.turn.scale
     return poses, values[order]
+
+
+def _rolled(values: Surface, rows: int, cols: int) -> Surface:
+    """Return `numpy.roll` by so many rows and columns, without its overhead, which is most of it for small surfaces."""
+    below, right = values.shape[0] - rows, values.shape[1] - cols
+    rolled = np.empty_like(values)
+    rolled[:rows, :cols], rolled[:rows, cols:] = values[below:, right:], values[below:, :right]
+    rolled[rows:, :cols], rolled[rows:, cols:] = values[:below, right:], values[:below, :right]
+    return rolled
 
 
 def _correlated(target: tuple[Surface, Surface], walls: Surface, free: Surface, conjugate: bool) -> Surface:

@@ -160,7 +160,7 @@ class TestScale:
         target, walls_m = noisy(2)
         for start in (0.98, 1.0, 1.02):
             (found,) = aligned(target, walls_m / 1.2, Sim2(scale=start), scales=(0.97, 1.03))
-            assert 0.97 <= found.scale <= 1.03
+            assert 0.97 - 1e-9 <= found.scale <= 1.03 + 1e-9
 
 
 class TestFew:

@@ -7,7 +7,7 @@ import pytest
 
 from mapmerge.align import placement_of, poses_of
 from mapmerge.config import MergeConfig
-from mapmerge.match.look import Look, beside, distinct, look, rivals, scored
+from mapmerge.match.look import Look, distinct, look, look_around, rivals, scored
 from mapmerge.prior import Prior
 from mapmerge.sim2 import Sim2
 from tests.floors import errors, flat, pair_of_maps, walled_room
@@ -55,13 +55,15 @@ class TestBeside:
     def test_along_a_wall_without_an_end_all_is_as_good(self):
         pair = pair_of_maps(*(walled_room((20.0, 6.0), open_ends=True, ragged=seed) for seed in (1, 2)))
         best = poses_of([pair.between_grids(Sim2())])
-        found = beside(pair, best, RIGID, CONFIG)
+        found = look_around(pair, best, poses_of([]), RIGID, CONFIG)
         against = rivals(scored(pair, best, CONFIG), found, pair, CONFIG.verify)
         assert against.scores_m[0] > 0.85 * scored(pair, best, CONFIG).scores_m[0]
 
     def test_in_a_flat_nothing_is(self):
         best = poses_of([TRUTH])
-        against = rivals(scored(PAIR, best, CONFIG), beside(PAIR, best, RIGID, CONFIG), PAIR, CONFIG.verify)
+        against = rivals(
+            scored(PAIR, best, CONFIG), look_around(PAIR, best, poses_of([]), RIGID, CONFIG), PAIR, CONFIG.verify
+        )
         assert against.scores_m.max(initial=0.0) < 0.5 * scored(PAIR, best, CONFIG).scores_m[0]
 
 
