@@ -266,7 +266,8 @@ class WatchConfig(Settings):
     hold_cells
         A placement is kept as it is as long as aligning it anew moves the walls by no more, root mean square.
     jump_share
-        A map jumped if more than this share of its walls contradict what it was before.
+        A map jumped if more than this share of its walls, and `VerifyConfig.min_matched_wall_m`, contradict what it was
+        before.
     least_kept_share
         Or if it still knows less than this share of what it knew before.
     """

@@ -90,7 +90,7 @@ class Canvas:
         self._cells = Plane(np.uint8)  # values of cells and 1, so that 0 is unknown
         self._grid: Grid | None = None
 
-    def update(self, layers: Mapping[str, Layer], lattice: Grid) -> Fusion:
+    def update(self, layers: Mapping[str, Layer], lattice: Grid, changed: Mapping[str, Box] | None = None) -> Fusion:
         """Return what is fused of these layers, by name; the same grid as before if none of its cells can differ.
 
         Parameters
@@ -99,13 +99,20 @@ class Canvas:
             The placed maps, in any order.
         lattice
             The reference's map, as in `fuse`.
+        changed
+            Cells of layers' maps outside of which they say what they said at the last update, where that is known; see
+            `mapmerge.lattice.changed_box`.
         """
         if self._lattice is None or offset_cells(self._lattice, lattice) is None:
             self._lattice, self._grid = lattice, None
             self._warps, self._counts, self._known, self._tiles = {}, {}, 0, {}
             self._cells = Plane(np.uint8)
         warps = {name: self._warp(name, layer, self._lattice) for name, layer in layers.items()}
-        dirty = {tile for name in {**self._warps, **warps} for tile in self._dirty(name, warps.get(name))}
+        dirty = {
+            tile
+            for name in {**self._warps, **warps}
+            for tile in self._dirty(self._warps.get(name), warps.get(name), (changed or {}).get(name))
+        }
         covered = NOTHING
         for warp in warps.values():
             covered = covered.union(warp.box)
@@ -126,15 +133,15 @@ class Canvas:
             return known
         return warped(layer, lattice, self._config)
 
-    def _dirty(self, name: str, after: Warp | None) -> Iterator[Box]:
+    @staticmethod
+    def _dirty(before: Warp | None, after: Warp | None, changed: Box | None) -> Iterator[Box]:
         """Yield the tiles on which one layer may have changed."""
-        before = self._warps.get(name)
         if before is after:
             return
         if before is not None and after is not None and before.layer.merged_from_map == after.layer.merged_from_map:
-            changed = changed_box(before.layer.grid, after.layer.grid)
-            if changed is not None and not before.is_pooled and not after.is_pooled:
-                yield from _tiles(after.on_canvas(changed))
+            found = changed_box(before.layer.grid, after.layer.grid) if changed is None else changed
+            if found is not None and not before.is_pooled and not after.is_pooled:
+                yield from _tiles(after.on_canvas(found))
                 return
         for warp in (before, after):
             if warp is not None:

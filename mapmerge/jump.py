@@ -5,7 +5,7 @@ So do maps after a loop closure, or after SLAM began anew. A map that only grew 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
 
 import cv2
 import numpy as np
@@ -13,74 +13,52 @@ from numpy.typing import NDArray
 
 from mapmerge.config import MergeConfig
 from mapmerge.grid import UNKNOWN, Cells, Grid, Mask
-from mapmerge.lattice import changed_box, offset_cells
+from mapmerge.lattice import offset_cells
 from mapmerge.plane import Box
 from mapmerge.sim2 import IDENTITY
 from mapmerge.warp import Layer, warped
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """How two maps of one robot differ in its map frame.
+def has_jumped(before: Grid, after: Grid, changed: Box | None, known_m2: float, config: MergeConfig) -> bool:
+    """Tell whether a robot's new map contradicts the one before it by more than a SLAM's growth explains.
 
     Parameters
     ----------
-    contradicted_share
-        Share of the walls that the other map shows as free space, off its own walls, mean of both directions.
-    kept_share
-        Share of what the first map knows that the second one knows as well.
+    before, after
+        The maps.
+    changed
+        Cells of ``after`` outside of which both say the same, see `mapmerge.lattice.changed_box`.
+    known_m2
+        What the map before knows.
+    config
+        Settings.
     """
-
-    contradicted_share: float
-    kept_share: float
-
-    def is_jump(self, config: MergeConfig) -> bool:
-        """Tell whether they differ by more than growth explains."""
-        limits = config.watch
-        return self.contradicted_share > limits.jump_share or self.kept_share < limits.least_kept_share
-
-
-def difference(before: Grid, after: Grid, config: MergeConfig) -> Difference:
-    """Return how a robot's new map differs from the one before it; only what changed is compared cell by cell."""
-    offset, changed = offset_cells(before, after), changed_box(before, after)
+    offset = offset_cells(before, after)
     if offset is None or changed is None:
         changed = Box(0, 0, *after.cells.shape)
         there = warped(Layer(before, IDENTITY), after, config.cells).tile(changed)
-        old = np.full(changed.shape, UNKNOWN, np.int8) if there is None else there.view(np.int8)
-        return _compared(old, after.cells, _Totals.of(old, config), config, after.resolution_m)
-    reach = max(1, round(config.verify.tolerance_m / after.resolution_m)) + 2
-    around = changed.padded(reach)
-    old, new = _read(before, around.shifted(*offset)), _read(after, around)
-    totals = _Totals.of(before.cells, config)
-    return _compared(old, new, totals, config, after.resolution_m)
+        old, new = np.full(changed.shape, UNKNOWN, np.int8) if there is None else there.view(np.int8), after.cells
+    else:
+        around = changed.padded(math.ceil(config.verify.tolerance_m / after.resolution_m) + 2)
+        old, new = _read(before, around.shifted(*offset)), _read(after, around)
+    kept_m2 = known_m2 - int(np.count_nonzero((old >= 0) & (new < 0))) * after.resolution_m**2
+    return kept_m2 < config.watch.least_kept_share * known_m2 or _contradicts(old, new, before, config)
 
 
-@dataclass(frozen=True, slots=True)
-class _Totals:
-    """Cells of the whole map before."""
-
-    known: int
-    walls: int
-
-    @staticmethod
-    def of(cells: Cells, config: MergeConfig) -> _Totals:
-        occupied = int(np.count_nonzero(cells >= config.cells.min_occupied_percent))
-        return _Totals(int(np.count_nonzero(cells >= 0)), occupied)
-
-
-def _compared(old: Cells, new: Cells, totals: _Totals, config: MergeConfig, resolution_m: float) -> Difference:
-    """Compare cells of both maps, outside of which both say the same."""
-    limits, tolerance_cells = config.cells, max(1.0, config.verify.tolerance_m / resolution_m)
+def _contradicts(old: Cells, new: Cells, before: Grid, config: MergeConfig) -> bool:
+    """Tell whether walls stand where the other map is free, and off its walls: too many of all that were there."""
+    limits, resolution_m = config.cells, before.resolution_m
     old_walls, new_walls = old >= limits.min_occupied_percent, new >= limits.min_occupied_percent
-    contradicted = 0
-    for walls, others, other in ((old_walls, new_walls, new), (new_walls, old_walls, old)):
-        free = (other >= 0) & (other <= limits.max_free_percent)
-        contradicted += int(np.count_nonzero(walls & free & _far(others, tolerance_cells)))
-    forgotten = int(np.count_nonzero((old >= 0) & (new < 0)))
-    return Difference(
-        contradicted_share=contradicted / 2 / totals.walls if totals.walls else 0.0,
-        kept_share=1.0 - forgotten / totals.known if totals.known else 1.0,
-    )
+    gone = old_walls & (new >= 0) & (new <= limits.max_free_percent)
+    came = new_walls & (old >= 0) & (old <= limits.max_free_percent)
+    least_cells = config.verify.min_matched_wall_m / resolution_m
+    if np.count_nonzero(gone) + np.count_nonzero(came) <= 2 * least_cells:
+        return False
+    tolerance_cells = max(1.0, config.verify.tolerance_m / resolution_m)
+    far = np.count_nonzero(gone & _far(new_walls, tolerance_cells))
+    far += np.count_nonzero(came & _far(old_walls, tolerance_cells))
+    all_cells = np.count_nonzero(before.cells >= limits.min_occupied_percent)
+    return bool(far > 2 * max(least_cells, config.watch.jump_share * all_cells))
 
 
 def _far(walls: Mask, distance_cells: float) -> Mask:

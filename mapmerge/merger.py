@@ -16,10 +16,12 @@ from mapmerge.evidence import Evidence
 from mapmerge.fuse import Canvas
 from mapmerge.graph import Edge, Forest, place
 from mapmerge.grid import Grid
-from mapmerge.jump import difference
+from mapmerge.jump import has_jumped
+from mapmerge.lattice import changed_box
 from mapmerge.match import Match, load_matcher
 from mapmerge.outcome import Change, Looked, Pair, RobotOutcome, Status, changes_of, outcomes_of
 from mapmerge.pairs import Mapped, News, Pairs
+from mapmerge.plane import Box
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
@@ -129,7 +131,7 @@ class Merger:
         if not updated and not is_last:
             self.result = replace(self.result, updated=(), changes=(), searched={})
             return self.result
-        jumped = self._take({robot: updates[robot] for robot in updated})
+        jumped, changed = self._take({robot: updates[robot] for robot in updated})
         news = News(frozenset(updated), frozenset(jumped), robots[0], is_last)
         believed = _pair_priors(robots[0], list(combinations(self._maps, 2)), priors or {}, self.result.priors)
         areas_m2 = {robot: known.area_m2 for robot, known in self._known.items()}
@@ -140,7 +142,7 @@ class Merger:
         layers = _layers(robots[0], self._maps, forest)
         latest = {**self.result.grids, **{robot: updates[robot] for robot in updated}}
         grids = {robot: latest[robot] for robot in robots if robot in latest}
-        fusion = self._canvas.update(layers, grids[robots[0]]) if layers else None
+        fusion = self._canvas.update(layers, grids[robots[0]], changed) if layers else None
         outcomes = outcomes_of(robots, pairs, forest, layers, fusion)
         centres_m = {robot: known.centre_m for robot, known in self._known.items()}
         looked = Looked(searched, jumped, {robot: outcome.shown_pair for robot, outcome in self.result.robots.items()})
@@ -160,22 +162,26 @@ class Merger:
             return self._unions.explain(pair, self._maps)
         return self._pairs.explain(pair, self._maps)
 
-    def _take(self, updates: Mapping[str, Grid]) -> tuple[str, ...]:
-        """Take in maps that are new; return the robots whose map jumped."""
-        jumped = []
+    def _take(self, updates: Mapping[str, Grid]) -> tuple[tuple[str, ...], dict[str, Box]]:
+        """Take in maps that are new; return whose map jumped, and which cells changed where that can be said."""
+        jumped: list[str] = []
+        changed: dict[str, Box] = {}
         for robot, grid in updates.items():
-            known = grid.cropped_to_known()
-            before = self._maps.pop(robot, None)
-            if known.cells.size == 0:
-                self._known.pop(robot, None)
+            after = grid.cropped_to_known()
+            before, known = self._maps.pop(robot, None), self._known.pop(robot, None)
+            if after.cells.size == 0:
                 continue
-            self._maps[robot] = known
-            self._known[robot] = _Known(known.known_area_m2, known.middle_m)
-            if before is not None and difference(before, known, self._config).is_jump(self._config):
+            self._maps[robot], self._known[robot] = after, _Known(after.known_area_m2, after.middle_m)
+            if before is None or known is None:
+                continue
+            box = changed_box(before, after)
+            if box is not None:
+                changed[robot] = box
+            if has_jumped(before, after, box, known.area_m2, self._config):
                 jumped.append(robot)
         # in the order of the robots, whenever their maps came
         self._maps = {robot: self._maps[robot] for robot in self.result.robots if robot in self._maps}
-        return tuple(jumped)
+        return tuple(jumped), changed
 
     def _linked(self, believed: Mapping[Pair, Prior]) -> tuple[dict[Pair, Match], Forest]:
         """Place robots by the matches of pairs, then those that only merged maps can place, one after the other."""

@@ -1,16 +1,12 @@
 """Alignment of a placement to a fraction of a cell.
 
 ICP cannot tell where in a cell it ends. `polish` can: it maximises the correlation of both maps' walls, each blurred by
-about a cell, which is smooth and treats the two maps alike. Each step alone goes a part of the way, the smaller the
-thicker the walls are; so where it would end is extrapolated from how the last ones shrank (Anderson acceleration: D. G.
-Anderson, *Iterative procedures for nonlinear integral equations*, 1965).
+about a cell, which is smooth and treats the two maps alike.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,17 +14,13 @@ from numpy.typing import NDArray
 from mapmerge.align import evenly
 from mapmerge.config import RefineConfig
 from mapmerge.prepared import CELL_OCCUPIED, PreparedMap
-from mapmerge.sim2 import Points, Sim2, wrap_angle
+from mapmerge.sim2 import Points, Sim2
 
 Floats = NDArray[np.float32]
-Vector = NDArray[np.float64]
 
 _CONVERGED_M = 2e-4
 _CONVERGED_RAD = 2e-5
 _MIN_PAIRS = 12
-_REMEMBERED = 2
-_MOST_STEPS_AT_ONCE = 10.0
-_SAME_CHANGE = 1e-3
 
 
 def polish(target: PreparedMap, wall_cells_m: Points, start: Sim2, config: RefineConfig) -> Sim2:
@@ -44,71 +36,15 @@ def polish(target: PreparedMap, wall_cells_m: Points, start: Sim2, config: Refin
         ``target_from_source`` that ICP returned; its scale is kept.
     """
     cells_m = evenly(wall_cells_m, config.max_polish_points)
-    if len(cells_m) == 0:
-        return start
-    frame = _Frame.about(cells_m, start)
-    pose = end = start
-    tried: list[Vector] = []
-    steps: list[Vector] = []
+    pose = start
     for _ in range(config.iterations):
         step = _blurred_step(target, pose.apply(cells_m), config.blur_cells)
         if step is None:
-            break
-        end = step @ pose
+            return pose
+        pose = step @ pose
         if _is_still(step):
             break
-        tried.append(frame.vector(pose))
-        steps.append(frame.vector(end) - tried[-1])
-        pose = frame.placement(_extrapolated(tried[-_REMEMBERED - 1 :], steps[-_REMEMBERED - 1 :]))
-    return end
-
-
-@dataclass(frozen=True, slots=True)
-class _Frame:
-    """Placements near one of them as vectors: where it moves the middle of the points, and the points about it.
-
-    Parameters
-    ----------
-    start
-        The placement whose vector is 0.
-    middle_m
-        Middle of the points, in the source's frame.
-    arm_m
-        How far the points are from it: a turn counts as much as it moves them.
-    """
-
-    start: Sim2
-    middle_m: tuple[float, float]
-    arm_m: float
-
-    @classmethod
-    def about(cls, points_m: Points, start: Sim2) -> _Frame:
-        x_m, y_m = points_m.mean(axis=0).tolist()
-        square = np.square(points_m - (x_m, y_m)).sum(axis=1).mean()
-        return cls(start, (x_m, y_m), max(math.sqrt(square), _CONVERGED_M))
-
-    def vector(self, placement: Sim2) -> Vector:
-        from_m, to_m = self.start.apply_point(*self.middle_m), placement.apply_point(*self.middle_m)
-        turn_rad = wrap_angle(placement.yaw_rad - self.start.yaw_rad)
-        return np.array([to_m[0] - from_m[0], to_m[1] - from_m[1], turn_rad * self.arm_m])
-
-    def placement(self, vector: Vector) -> Sim2:
-        x_m, y_m, turned_m = vector.tolist()
-        turn = Sim2(yaw_rad=self.start.yaw_rad + turned_m / self.arm_m, scale=self.start.scale)
-        from_m, turned = self.start.apply_point(*self.middle_m), turn.apply_point(*self.middle_m)
-        return Sim2(from_m[0] + x_m - turned[0], from_m[1] + y_m - turned[1], turn.yaw_rad, turn.scale)
-
-
-def _extrapolated(tried: Sequence[Vector], steps: Sequence[Vector]) -> Vector:
-    """Return where steps would end if they went on to change as they did, or after the last step if it is the first."""
-    last, step = tried[-1], steps[-1]
-    if len(steps) == 1:
-        return last + step
-    moves, changes = np.diff(tried, axis=0).T, np.diff(steps, axis=0).T
-    share = np.linalg.lstsq(changes, step, rcond=_SAME_CHANGE)[0]
-    way = step - (moves + changes) @ share
-    length, most = float(np.linalg.norm(way)), _MOST_STEPS_AT_ONCE * float(np.linalg.norm(step))
-    return last + way * min(1.0, most / max(length, 1e-12))
+    return pose
 
 
 def _blurred_step(target: PreparedMap, points_m: Points, blur_cells: float) -> Sim2 | None:
@@ -121,10 +57,10 @@ def _blurred_step(target: PreparedMap, points_m: Points, blur_cells: float) -> S
     drawn = np.flatnonzero(weight > 0)
     if len(drawn) < _MIN_PAIRS:
         return None
-    wall, points = weight[drawn].astype(np.float64), points_m[drawn]
-    error = np.stack([pull_x[drawn], pull_y[drawn]], axis=1) / wall[:, None]
+    weight, points = weight[drawn].astype(np.float64), points_m[drawn]
+    error = np.stack([pull_x[drawn], pull_y[drawn]], axis=1) / weight[:, None]
     centre = points.mean(axis=0)
-    return _rigid_motion(points - centre, error * target.resolution_m, wall, centre)
+    return _rigid_motion(points - centre, error * target.resolution_m, weight, centre)
 
 
 def _pulls(target: PreparedMap, place: Points, blur_cells: float) -> tuple[Floats, Floats, Floats]:

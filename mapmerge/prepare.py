@@ -123,8 +123,10 @@ class LiveMap:
         for band in changed.padded(self._reach_of_meets).within(padded).bands(_BAND_CELLS):
             self._meet(band)
         self._sample_free(covered, changed)
-        occupied = self._classes.part(covered) == CELL_OCCUPIED
-        self._walls.update(occupied, covered, changed)
+        self._walls.update(self._occupied, covered, changed)
+
+    def _occupied(self, box: Box) -> Mask:
+        return self._classes.part(box) == CELL_OCCUPIED
 
     @property
     def _tolerance_m(self) -> float:
@@ -183,9 +185,9 @@ class LiveMap:
             classes=self._classes.cells,
             meets=self._meets.cells,
             nearest=nearest,
-            wall_cells_m=cell_centres_m(walls.cell_rows - row, walls.cell_cols - col, cell_m),
+            wall_cells=(walls.cell_rows - row, walls.cell_cols - col),
             walls_m=np.stack([x_m[walls.numbers], y_m[walls.numbers]], axis=1),
-            directions=walls.directions[walls.numbers],
+            numbers=walls.numbers,
             free_m=cell_centres_m(self._free_rows - row, self._free_cols - col, cell_m),
             wall_spacing_m=self._spacing_m,
             free_spacing_m=self._free_step * cell_m,

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.grid import Grid
+from mapmerge.grid import Grid, cell_centres_m
 from mapmerge.sim2 import Points
+
+Whole = NDArray[np.int64]
 
 CELL_UNKNOWN, CELL_FREE, CELL_OCCUPIED, CELL_UNSURE = 0, 1, 2, 3
 MEETS_FREE, MEETS_WALL, MEETS_NEAR = 1, 2, 4
@@ -29,7 +31,7 @@ class NearestWalls:
     x_m, y_m
         Where these walls are, shape (S,) each, in the order of their numbers. Number 0 is far from everything.
     directions
-        `PreparedMap.directions` in the order of these numbers, shape (S, 2).
+        Which way they run, shape (S, 2), see `PreparedMap.directions`.
     cell_m
         Side of a cell: `PreparedMap.wall_spacing_m`, so that each cell holds at most one of these walls.
     corner_m
@@ -79,13 +81,12 @@ class PreparedMap:
         Shape as `classes`, uint8: what a point there meets, bits `MEETS_FREE`, `MEETS_WALL` and `MEETS_NEAR`.
     nearest
         The nearest of `walls_m` for each place.
-    wall_cells_m
-        Centres of all occupied cells, shape (N, 2).
+    wall_cells
+        Rows and columns of all occupied cells, shape (N,) each.
     walls_m
-        The same thinned to one point per `SearchConfig.wall_spacing_m`, shape (M, 2).
-    directions
-        For each of `walls_m` which way the wall runs, shape (M, 2): cosine and sine of twice the angle, shorter than 1
-        where it is no straight line.
+        The middles of these, thinned to one point per `SearchConfig.wall_spacing_m`, shape (M, 2).
+    numbers
+        The number of each of `walls_m` in `nearest`, shape (M,).
     free_m
         Free space, one point per about `FREE_SPACING_M`, shape (K, 2).
     wall_spacing_m, free_spacing_m
@@ -99,9 +100,9 @@ class PreparedMap:
     classes: NDArray[np.uint8]
     meets: NDArray[np.uint8]
     nearest: NearestWalls
-    wall_cells_m: Points
+    wall_cells: tuple[Whole, Whole]
     walls_m: Points
-    directions: NDArray[np.float32]
+    numbers: NDArray[np.int32]
     free_m: Points
     wall_spacing_m: float
     free_spacing_m: float
@@ -111,6 +112,19 @@ class PreparedMap:
     def resolution_m(self) -> float:
         """Side of a cell."""
         return self.grid.resolution_m
+
+    @property
+    def wall_cells_m(self) -> Points:
+        """Centres of all occupied cells, shape (N, 2)."""
+        return cell_centres_m(*self.wall_cells, self.resolution_m)
+
+    @property
+    def directions(self) -> NDArray[np.float32]:
+        """For each of `walls_m` which way the wall runs, shape (M, 2).
+
+        Cosine and sine of twice the angle; shorter than 1 where the wall is no straight line.
+        """
+        return self.nearest.directions[self.numbers]
 
     @property
     def extent_m(self) -> tuple[float, float]:

@@ -7,6 +7,7 @@ what is computed anew of the same map.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TypeVar
 
 import cv2
@@ -105,15 +106,15 @@ class LiveWalls:
         """How far around what is known the nearest wall is kept."""
         return math.ceil(self.reach_squares) + 1
 
-    def update(self, occupied: Mask, covered: Box, changed: Box) -> None:
+    def update(self, occupied: Callable[[Box], Mask], covered: Box, changed: Box) -> None:
         """Take in that a box of cells changed.
 
         Parameters
         ----------
         occupied
-            Which cells of the map are occupied.
+            Tells which cells of a box are occupied.
         covered
-            What ``occupied`` covers: all that is known, and the changed cells.
+            All that is known.
         changed
             What may differ from before.
         """
@@ -128,12 +129,13 @@ class LiveWalls:
         for band in appeared.padded(self.margin_squares).within(known).bands(_BAND_SQUARES):
             self._find_nearest(band)
 
-    def _renew(self, occupied: Mask, covered: Box, band: Box) -> tuple[Box, Box]:
+    def _renew(self, occupied: Callable[[Box], Mask], covered: Box, band: Box) -> tuple[Box, Box]:
         """Collect the walls of a band of squares; return the boxes of squares whose walls moved, and came or went."""
         first, last = self.squares.rows_of_cells(band)
         rows = Box(first, covered.left, last, covered.right).within(covered)
-        row, col = np.nonzero(occupied[rows.slices(covered)])
-        row, col = row.astype(np.int64) + rows.top, col.astype(np.int64) + rows.left
+        cells = np.flatnonzero(np.ascontiguousarray(occupied(rows))).astype(np.int64)
+        row, col = np.divmod(cells, max(1, rows.shape[1]))
+        row, col = row + rows.top, col + rows.left
         begin, end = np.searchsorted(self.cell_rows, (first, last))
         self.cell_rows = _spliced(self.cell_rows, begin, end, row)
         self.cell_cols = _spliced(self.cell_cols, begin, end, col)
