@@ -259,10 +259,14 @@ class WatchConfig(Settings):
         Or once the share of the walls that agree has fallen by this.
     likeness_rise
         Or once the score of its best rival, as a share of its own, has risen by this.
-    area_growth
-        Maps without a placement are searched once one of them knows so many times as much as at the last search.
-    longest_wait
-        Or after 1, 2, 4, … updates, at most so many.
+    glance_growth, longest_glance_wait
+        Maps without a placement are glanced at, to tell whether a search may find one, once one of them knows so many
+        times as much as at the last glance, or after 1, 2, 4, … updates, at most so many.
+    search_growth, longest_search_wait
+        They are searched, whatever a glance says, once one of them knows so many times as much as at the last search,
+        or after so many updates.
+    hopeful_odds
+        A glance is hopeful if it finds a placement that is by itself at least so many times as likely as none.
     hold_cells
         A placement is kept as it is as long as aligning it anew moves the walls by no more, root mean square.
     jump_share
@@ -275,8 +279,11 @@ class WatchConfig(Settings):
     overlap_growth: float = 1.5
     agreement_drop: float = 0.05
     likeness_rise: float = 0.1
-    area_growth: float = 1.25
-    longest_wait: int = 64
+    glance_growth: float = 1.15
+    longest_glance_wait: int = 16
+    search_growth: float = 2.0
+    longest_search_wait: int = 64
+    hopeful_odds: float = 0.05
     hold_cells: float = 0.5
     jump_share: float = 0.05
     least_kept_share: float = 0.5

@@ -145,14 +145,28 @@ class Pairs:
             return Trigger.MAP_JUMPED
         if news.updated & set(pair):
             watch = self._watches[pair] = watch.updated()
-        if news.is_last and watch.waited:
+        if news.is_last and watch.searched.updates:
             return Trigger.END
         if not news.updated & set(pair):
             return None
         if self.matches[pair].accepted:
             return self._doubt(pair, maps, watch, prior)
-        areas = areas_m2[pair[0]], areas_m2[pair[1]]
-        return Trigger.RETRY if watch.is_retry_due(areas, self._config.watch) else None
+        return self._retry(pair, maps, watch, (areas_m2[pair[0]], areas_m2[pair[1]]))
+
+    def _retry(
+        self, pair: Pair, maps: Mapping[str, Grid], watch: Watch, areas_m2: tuple[float, float]
+    ) -> Trigger | None:
+        """Tell whether a pair without a placement is searched again: if a glance is hopeful, or in any case."""
+        config = self._config.watch
+        if watch.is_search_due(areas_m2, config):
+            return Trigger.RETRY
+        if not watch.is_glance_due(areas_m2, config):
+            return None
+        target, source = self._maps_of(pair, maps)
+        if self._matcher.is_hopeful(target, source, self._config):
+            return Trigger.RETRY
+        self._watches[pair] = watch.after_glance(areas_m2, config)
+        return None
 
     def _doubt(self, pair: Pair, maps: Mapping[str, Grid], watch: Watch, prior: Prior | None) -> Trigger | None:
         """Follow an accepted placement; return why that does not suffice."""

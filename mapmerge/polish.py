@@ -57,10 +57,10 @@ def _blurred_step(target: PreparedMap, points_m: Points, blur_cells: float) -> S
     drawn = np.flatnonzero(weight > 0)
     if len(drawn) < _MIN_PAIRS:
         return None
-    weight, points = weight[drawn].astype(np.float64), points_m[drawn]
-    error = np.stack([pull_x[drawn], pull_y[drawn]], axis=1) / weight[:, None]
+    drawn_weight, points = weight[drawn].astype(np.float64), points_m[drawn]
+    error = np.stack([pull_x[drawn], pull_y[drawn]], axis=1).astype(np.float64) / drawn_weight[:, None]
     centre = points.mean(axis=0)
-    return _rigid_motion(points - centre, error * target.resolution_m, weight, centre)
+    return _rigid_motion(points - centre, error * target.resolution_m, drawn_weight, centre)
 
 
 def _pulls(target: PreparedMap, place: Points, blur_cells: float) -> tuple[Floats, Floats, Floats]:

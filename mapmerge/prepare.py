@@ -126,7 +126,7 @@ class LiveMap:
         self._walls.update(self._occupied, covered, changed)
 
     def _occupied(self, box: Box) -> Mask:
-        return self._classes.part(box) == CELL_OCCUPIED
+        return np.asarray(self._classes.part(box) == CELL_OCCUPIED, np.bool_)
 
     @property
     def _tolerance_m(self) -> float:

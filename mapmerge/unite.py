@@ -105,11 +105,11 @@ class Unions:
         areas_m2: tuple[float, float],
         grids: Mapping[str, Grid],
     ) -> bool:
-        if self._is_last and union.watch.waited:
+        if self._is_last and union.watch.searched.updates:
             return True
         if any(self._moved(was, now, grids) for was, now in zip(union.places, places, strict=True)):
             return True
-        return union.watch.is_retry_due(areas_m2, self._config.watch)
+        return union.watch.is_glance_due(areas_m2, self._config.watch)
 
     def _moved(self, was: Placed, now: Placed, grids: Mapping[str, Grid]) -> bool:
         """Tell whether a robot's place in its component is another one."""

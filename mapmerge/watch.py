@@ -52,44 +52,77 @@ _WORDS: Mapping[Trigger, str] = {
 
 
 @dataclass(frozen=True, slots=True)
+class Look:
+    """When two sets of maps were looked at.
+
+    Parameters
+    ----------
+    areas_m2
+        What either knew then.
+    updates
+        How often they have changed since.
+    """
+
+    areas_m2: tuple[float, float]
+    updates: int = 0
+
+    def is_due(self, areas_m2: tuple[float, float], growth: float, wait: int) -> bool:
+        """Tell whether one of the maps has grown so many times since, or so many updates have come."""
+        grown = any(now > growth * then for now, then in zip(areas_m2, self.areas_m2, strict=True))
+        return self.updates >= wait or (grown and self.updates > 0)
+
+
+@dataclass(frozen=True, slots=True)
 class Watch:
     """What was known of two sets of maps when they were searched last, and what happened since.
 
     Parameters
     ----------
-    areas_m2
-        What either knew.
+    searched, glanced
+        When they were searched, and when that was last considered.
+    wait
+        After how many updates without a placement the next glance is due at the latest.
     overlap_m2, agreement, likeness
         Of the placement that was accepted then: what it shared, the share of the walls that agreed, and the score of
         the best rival over its own; 0 without a placement, or a rival.
-    wait
-        After how many updates without a placement the next search is due at the latest.
-    waited
-        Updates since.
     """
 
-    areas_m2: tuple[float, float]
+    searched: Look
+    glanced: Look
+    wait: int = 1
     overlap_m2: float = 0.0
     agreement: float = 0.0
     likeness: float = 0.0
-    wait: int = 1
-    waited: int = 0
 
     @staticmethod
     def of(match: Match, areas_m2: tuple[float, float], before: Watch | None, config: WatchConfig) -> Watch:
-        """Return the watch over a pair that was just searched: without a placement, the next wait is twice as long."""
+        """Return the watch over maps that were just searched, given the watch over them before that, if it goes on."""
+        now = Look(areas_m2)
         if match.accepted and match.scores is not None:
-            return Watch(areas_m2, match.scores.overlap_m2, match.scores.wall_agreement, match.likeness)
-        return Watch(areas_m2, wait=1 if before is None else min(2 * before.wait, config.longest_wait))
+            scores = match.scores
+            return Watch(now, now, 1, scores.overlap_m2, scores.wall_agreement, match.likeness)
+        return Watch(now, now, 1 if before is None else before.next_wait(config))
+
+    def next_wait(self, config: WatchConfig) -> int:
+        """Return how long to wait after nothing was found once more: twice as long."""
+        return min(2 * self.wait, config.longest_glance_wait)
 
     def updated(self) -> Watch:
-        """Return the watch after an update of one of the maps, or of both."""
-        return replace(self, waited=self.waited + 1)
+        """Return the watch after an update of the maps."""
+        searched, glanced = (replace(look, updates=look.updates + 1) for look in (self.searched, self.glanced))
+        return replace(self, searched=searched, glanced=glanced)
 
-    def is_retry_due(self, areas_m2: tuple[float, float], config: WatchConfig) -> bool:
-        """Tell whether maps without a placement are due: they have grown, or changed so often that it may be enough."""
-        grown = any(now > config.area_growth * then for now, then in zip(areas_m2, self.areas_m2, strict=True))
-        return self.waited >= self.wait or (grown and self.waited > 0)
+    def after_glance(self, areas_m2: tuple[float, float], config: WatchConfig) -> Watch:
+        """Return the watch after a glance that had no hope."""
+        return replace(self, glanced=Look(areas_m2), wait=self.next_wait(config))
+
+    def is_glance_due(self, areas_m2: tuple[float, float], config: WatchConfig) -> bool:
+        """Tell whether maps without a placement have changed enough to be glanced at."""
+        return self.glanced.is_due(areas_m2, config.glance_growth, self.wait)
+
+    def is_search_due(self, areas_m2: tuple[float, float], config: WatchConfig) -> bool:
+        """Tell whether maps without a placement have changed so much that they are searched whatever a glance says."""
+        return self.searched.is_due(areas_m2, config.search_growth, config.longest_search_wait)
 
     def doubts(self, match: Match, config: WatchConfig) -> Trigger | None:
         """Return why a placement that was followed should be searched anew; None if it holds."""

@@ -131,6 +131,11 @@ class Matcher(Protocol[PreparedT]):
         """Return what `prepare` would return for the map, up to rounding; what is given is used up."""
         return prepared
 
+    def is_hopeful(self, target: PreparedT, source: PreparedT, config: MergeConfig) -> bool:
+        """Tell whether a search of maps without a placement may find one now: cheaper than the search, and no proof."""
+        del target, source, config
+        return True
+
     def follow(
         self, target: PreparedT, source: PreparedT, known: Match, config: MergeConfig, prior: Prior | None = None
     ) -> Match | None:

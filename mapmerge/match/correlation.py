@@ -24,14 +24,14 @@ from mapmerge.evidence import Evidence
 from mapmerge.grid import Grid
 from mapmerge.match.base import Match, Matcher, Rival
 from mapmerge.match.candidates import all_scales, by_half_turn, by_prior, by_spectra, by_sweep, likely_rotations
-from mapmerge.match.confidence import confidence, times_as_likely
-from mapmerge.match.cues import Cues, Fit
+from mapmerge.match.confidence import confidence, log_odds_of, times_as_likely
+from mapmerge.match.cues import Cues, Fit, fit_of
 from mapmerge.match.explain import explained
 from mapmerge.match.follow import followed
 from mapmerge.match.look import Look, look, look_around, rivals
 from mapmerge.match.pair import DescribedMap, PairOfMaps, ordered
 from mapmerge.match.verdict import contradicted, is_far_likelier, judge, too_little_structure, within
-from mapmerge.match.weigh import Weighed, weighed
+from mapmerge.match.weigh import Weighed, shares_too_little, weighed
 from mapmerge.polish import polish
 from mapmerge.prepare import LiveMap
 from mapmerge.prior import Prior
@@ -40,6 +40,7 @@ from mapmerge.sim2 import Sim2
 from mapmerge.verify import verify
 
 _ROUNDS = 4
+_GLANCED_AT = 3
 
 
 class CorrelationMatcher(Matcher[DescribedMap]):
@@ -73,6 +74,21 @@ class CorrelationMatcher(Matcher[DescribedMap]):
             elsewhere = replace(pair, prior=None)
             match = _held_against(match, _matched(elsewhere, config), pair, config)
         return match.inverse() if pair.swapped else match
+
+    def is_hopeful(self, target: DescribedMap, source: DescribedMap, config: MergeConfig) -> bool:
+        """Tell whether the first look of a search finds a placement that may be right by itself."""
+        if too_little_structure(target, source, config.verify) is not None:
+            return False
+        pair = ordered(target, source)
+        scales, steps = _scales(pair, config)
+        seen = look(pair, by_spectra(pair, likely_rotations(pair, config.search), steps, config.search), scales, config)
+        best = _apart(pair, seen, config).rows(slice(0, _GLANCED_AT))
+        poses = best.poses[best.matched_m >= config.verify.min_matched_wall_m]
+        fits = (fit_of(pair, placement_of(pose), config) for pose in poses)
+        return any(
+            times_as_likely(log_odds_of(fit)) >= config.watch.hopeful_odds and not shares_too_little(fit, config.verify)
+            for fit in fits
+        )
 
     def follow(
         self, target: DescribedMap, source: DescribedMap, known: Match, config: MergeConfig, prior: Prior | None = None
