@@ -50,6 +50,7 @@ class ReportBuilder:
         self._history: list[Json] = []
         self._notes: list[Json] = []
         self._priors: Mapping[str, Prior] = {}
+        self._searched: dict[Pair, Json] = {}
 
     def skip(self, event: Skipped) -> None:
         """Count a message that was not used."""
@@ -72,8 +73,11 @@ class ReportBuilder:
                     "robot": change.robot,
                     "event": str(change.kind),
                     "reason": _reason(change.reason),
+                    "trigger": None if change.trigger is None else str(change.trigger),
                 }
             )
+        for pair, trigger in result.searched.items():
+            self._searched[pair] = {"stamp_ns": stamp_ns, "trigger": str(trigger)}
 
     def build(self, stamp_ns: int | None, result: MergeResult, inputs: Sequence[Mapping[str, Any]]) -> Report:
         """Return the report as of now."""
@@ -83,7 +87,10 @@ class ReportBuilder:
             "stamp_ns": stamp_ns,
             "reference": self._robots[0].robot,
             "robots": {item.robot: self._robot(item, result.robots[item.robot]) for item in self._robots},
-            "pairs": [_pair(pair, match, result.priors.get(pair)) for pair, match in result.pairs.items()],
+            "pairs": [
+                {**_pair(pair, match, result.priors.get(pair)), "searched": self._searched.get(pair)}
+                for pair, match in result.pairs.items()
+            ],
             "history": list(self._history),
             "notes": list(self._notes),
             "updates": self._updates.total(),

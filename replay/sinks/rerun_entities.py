@@ -13,7 +13,7 @@
     plots/<quantity>/placed|refused/<robot>
     plots/acceptance/limit          least acceptance index
     plots/step_ms/merge|render      wall time of each step
-    decisions                       what was placed, moved, withdrawn and skipped, and why
+    decisions                       what jumped, was placed, moved, withdrawn or skipped, and why
     robots                          the table of robots as of now
     about                           inputs and settings
 """

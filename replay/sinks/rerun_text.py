@@ -20,7 +20,7 @@ _COLUMNS = ("robot", "status", "x, m", "y, m", "yaw, °", "acceptance", "overlap
 
 
 def decisions(result: MergeResult) -> Iterator[Entry]:
-    """Say what was placed, moved or withdrawn in a step."""
+    """Say what jumped, or was placed, moved or withdrawn in a step."""
     for change in result.changes:
         yield _decision(change, result.robots[change.robot].merged_from_map)
 
@@ -62,11 +62,14 @@ def about(report: Report) -> str:
 
 
 def _decision(change: Change, pose: Sim2 | None) -> Entry:
+    why = f" (searched, as {change.trigger.words})" if change.trigger else ""
+    if change.kind is ChangeKind.JUMPED:
+        return WARN, f"the map of {change.robot} jumped in its own frame: it contradicts what it was before"
     if change.kind is ChangeKind.WITHDRAWN or pose is None:
-        return WARN, f"{change.robot} is withdrawn: {change.reason.message}"
+        return WARN, f"{change.robot} is withdrawn: {change.reason.message}{why}"
     at = f"x {pose.x_m:.2f} m, y {pose.y_m:.2f} m, yaw {math.degrees(pose.yaw_rad):.1f}°"
     if change.kind is ChangeKind.MOVED:
-        return INFO, f"{change.robot} moved to {at}: {change.reason.message}"
+        return INFO, f"{change.robot} moved to {at}: {change.reason.message}{why}"
     return INFO, f"{change.robot} {change.reason.message}; at {at}"
 
 
