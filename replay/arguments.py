@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -191,6 +192,12 @@ def _output_arguments(parser: argparse.ArgumentParser) -> None:
     )
     outputs.add_argument("--json", action="store_true", help="print the report instead of a table")
     rules = parser.add_argument_group("rules")
+    rules.add_argument(
+        "--jobs",
+        metavar="N",
+        help="threads that work at once, for reading, matching and writing; outputs are the same (default: one for "
+        "each processor)",
+    )
     rules.add_argument("--strict", action="store_true", help="end with an error at the first message that is unusable")
     rules.add_argument(
         "--require-all", action="store_true", help="exit with 1 unless two robots or more were merged, all"
@@ -236,7 +243,17 @@ def _placing_options(options: argparse.Namespace) -> dict[str, Any]:
         "init_poses": tuple(InitPose.parse(text) for text in options.init_pose),
         "use_tf": options.use_tf,
         "merge": merge,
+        "jobs": _jobs(options.jobs),
     }
+
+
+def _jobs(text: str | None) -> int:
+    """Return how many threads are to work at once; those that there are processors for, if nothing is said."""
+    if text is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if not text.isascii() or not text.isdigit() or not int(text):
+        raise UsageError(f"--jobs {text}: expected a number of threads, 1 or more")
+    return int(text)
 
 
 def _probability(text: str) -> float:

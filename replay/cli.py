@@ -86,6 +86,8 @@ def _merge(options: argparse.Namespace) -> int:
     outputs = output_options(options, run)
     _refuse_outputs(outputs, run)
 
+    import cv2
+
     from replay.pipeline import drain, events
     from replay.plan import open_plan
     from replay.sinks import open_sinks, output_paths
@@ -93,11 +95,12 @@ def _merge(options: argparse.Namespace) -> int:
     from replay.sinks.partial_file import output_errors
     from replay.sinks.terminal import Narrator, ProgressSink, open_console, print_table
 
+    cv2.setNumThreads(run.jobs)
     notes = open_console(stderr=True)
     with open_plan(run) as plan:
         narrator = Narrator(notes, announce=run.robots is None, unused_topics=plan.unused_topics())
         with open_sinks(outputs, extra=(ProgressSink(notes), narrator)) as sinks:
-            report = drain(events(plan, run), sinks).report
+            report = drain(events(plan, run), sinks, run.jobs).report
     if not outputs.rrd:
         # one of an earlier run, which --force replaces, must not stand beside these outputs
         stale = outputs.mcap.with_suffix(".rrd")

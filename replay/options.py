@@ -96,6 +96,9 @@ class RunOptions:
         Whether recorded transforms between map frames say so, for robots without such a pose.
     merge
         Settings of the merger.
+    jobs
+        How many threads work at once: more than one read ahead, match pairs and write beside the merging. The outcome
+        is the same.
     """
 
     runs: tuple[RunPath, ...]
@@ -111,6 +114,7 @@ class RunOptions:
     init_poses: tuple[InitPose, ...] = ()
     use_tf: bool = False
     merge: MergeConfig = field(default_factory=MergeConfig)
+    jobs: int = 1
 
     def settings(self) -> Mapping[str, Any]:
         """Return the settings that affect results, as written to reports."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from time import perf_counter
 
 from mapmerge.errors import MapMergeError
 from mapmerge.merger import Merger
 from replay import __version__
 from replay.arrivals import Tally
+from replay.background import Courier, ReadAhead
 from replay.beliefs import Beliefs
 from replay.errors import InputError
 from replay.events import Event, Finished, Merged, Noted, Skipped, Started, Timing
@@ -28,33 +31,37 @@ def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
     feeds = (*plan.feeds, *(plan.transform_feeds or ()))
     tallies = tuple(Tally() for _ in feeds)
     inputs = plan.describe_inputs()
-    merger = Merger([item.robot for item in plan.robots], options.merge)
-    gallery = Gallery(options.images, merger.explain)
     done, total, stamp_ns = 0, sum(item.message_count for item in plan.robots), None
 
     yield Started(plan.robots, settings, inputs)
     yield from _noted(report, beliefs.foreseen())
-    for tick in ticks(feeds, tallies, plan.window, strict=options.strict):
-        if isinstance(tick, Transforms):
-            beliefs.take(tick)
-            continue
-        if isinstance(tick, Skipped):
-            report.skip(tick)
-            yield tick
-            continue
-        priors, notes = beliefs.now()
-        yield from _noted(report, notes)
-        begin = perf_counter()
-        try:
-            result = merger.step(tick.grids, priors, is_last=tick.is_last)
-        except MapMergeError as error:
-            raise InputError(f"the maps of {', '.join(tick.grids)} at {tick.stamp_ns} ns: {error}") from error
-        merged = perf_counter()
-        pictures = gallery.due(result)
-        timing = Timing(merged - begin, perf_counter() - merged)
-        report.take(tick.stamp_ns, result, priors)
-        done, stamp_ns = done + tick.messages, tick.stamp_ns
-        yield Merged(stamp_ns, result, report.build(stamp_ns, result, inputs), pictures, timing, done, total)
+    with ExitStack() as stack:
+        read = ticks(feeds, tallies, plan.window, strict=options.strict)
+        items = stack.enter_context(ReadAhead(read)) if options.jobs > 1 else read
+        mapped = stack.enter_context(ThreadPoolExecutor(options.jobs)).map if options.jobs > 1 else map
+        merger = Merger([item.robot for item in plan.robots], options.merge, mapped)
+        gallery = Gallery(options.images, merger.explain)
+        for tick in items:
+            if isinstance(tick, Transforms):
+                beliefs.take(tick)
+                continue
+            if isinstance(tick, Skipped):
+                report.skip(tick)
+                yield tick
+                continue
+            priors, notes = beliefs.now()
+            yield from _noted(report, notes)
+            begin = perf_counter()
+            try:
+                result = merger.step(tick.grids, priors, is_last=tick.is_last)
+            except MapMergeError as error:
+                raise InputError(f"the maps of {', '.join(tick.grids)} at {tick.stamp_ns} ns: {error}") from error
+            merged = perf_counter()
+            pictures = gallery.due(result)
+            timing = Timing(merged - begin, perf_counter() - merged)
+            report.take(tick.stamp_ns, result, priors)
+            done, stamp_ns = done + tick.messages, tick.stamp_ns
+            yield Merged(stamp_ns, result, report.build(stamp_ns, result, inputs), pictures, timing, done, total)
     yield from _noted(report, beliefs.missed())
     yield Finished(report.build(stamp_ns, merger.result, plan.describe_inputs(tallies)))
 
@@ -77,12 +84,22 @@ def merge(options: RunOptions) -> Iterator[Event]:
         yield from events(plan, options)
 
 
-def drain(stream: Iterable[Event], sinks: Iterable[Sink]) -> Finished:
-    """Give each event to each sink, and return the last event."""
+def drain(stream: Iterable[Event], sinks: Iterable[Sink], jobs: int = 1) -> Finished:
+    """Give each event to each sink, in a thread of its own if there are several jobs, and return the last event."""
     targets = tuple(sinks)
-    for event in stream:
+
+    def give(event: Event) -> None:
         for sink in targets:
             sink.take(event)
-        if isinstance(event, Finished):
-            return event
-    raise AssertionError("a run ends with Finished")
+
+    last: Event | None = None
+    with ExitStack() as stack:
+        # whatever happens, the reading ends before the recordings are closed
+        stack.callback(getattr(stream, "close", lambda: None))
+        take = stack.enter_context(Courier(give)).send if jobs > 1 else give
+        for event in stream:
+            last = event
+            take(event)
+    if not isinstance(last, Finished):
+        raise AssertionError("a run ends with Finished")
+    return last
