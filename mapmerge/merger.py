@@ -13,7 +13,7 @@ from itertools import combinations
 from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError
 from mapmerge.evidence import Evidence
-from mapmerge.fuse import Canvas
+from mapmerge.fuse import Canvas, Fusion
 from mapmerge.graph import Edge, Forest, place
 from mapmerge.grid import Grid
 from mapmerge.jump import has_jumped
@@ -132,21 +132,17 @@ class Merger:
             self.result = replace(self.result, updated=(), changes=(), searched={})
             return self.result
         jumped, changed = self._take({robot: updates[robot] for robot in updated})
-        news = News(frozenset(updated), frozenset(jumped), robots[0], is_last)
+        latest = {**self.result.grids, **{robot: updates[robot] for robot in updated}}
+        grids = {robot: latest[robot] for robot in robots if robot in latest}
         believed = _pair_priors(robots[0], list(combinations(self._maps, 2)), priors or {}, self.result.priors)
-        areas_m2 = {robot: known.area_m2 for robot, known in self._known.items()}
-        searched = self._pairs.update(self._maps, areas_m2, believed, news)
-        self._unions.update(self._maps, news)
+        news = News(frozenset(updated), frozenset(jumped), robots[0], is_last)
+        searched = self._search(believed, news)
         matches, forest = self._linked(believed)
         pairs = _without_contradicted(matches, forest)
         layers = _layers(robots[0], self._maps, forest)
-        latest = {**self.result.grids, **{robot: updates[robot] for robot in updated}}
-        grids = {robot: latest[robot] for robot in robots if robot in latest}
-        fusion = self._canvas.update(layers, grids[robots[0]], changed) if layers else None
+        fusion = self._fused(layers, grids.get(robots[0]), changed)
         outcomes = outcomes_of(robots, pairs, forest, layers, fusion)
-        centres_m = {robot: known.centre_m for robot, known in self._known.items()}
-        looked = Looked(searched, jumped, {robot: outcome.shown_pair for robot, outcome in self.result.robots.items()})
-        changes, self._reported = changes_of(outcomes, self._reported, centres_m, looked, self._config)
+        changes = self._changes(outcomes, searched, jumped)
         merged = fusion.grid if fusion else None
         self.result = MergeResult(outcomes, grids, pairs, believed, searched, merged, updated, changes)
         return self.result
@@ -183,6 +179,12 @@ class Merger:
         self._maps = {robot: self._maps[robot] for robot in self.result.robots if robot in self._maps}
         return tuple(jumped), changed
 
+    def _search(self, believed: Mapping[Pair, Prior], news: News) -> dict[Pair, Trigger]:
+        """Bring the matches of pairs up to date; return which were searched, and why."""
+        areas_m2 = {robot: known.area_m2 for robot, known in self._known.items()}
+        self._unions.update(self._maps, news)
+        return self._pairs.update(self._maps, areas_m2, believed, news)
+
     def _linked(self, believed: Mapping[Pair, Prior]) -> tuple[dict[Pair, Match], Forest]:
         """Place robots by the matches of pairs, then those that only merged maps can place, one after the other."""
         alone = self._pairs.matches
@@ -196,6 +198,22 @@ class Merger:
                 self._of_merged_maps.add(link.pair)
             forest = _placed(centres_m, matches, self._config)
         return matches, forest
+
+    def _fused(self, layers: Mapping[str, Layer], lattice: Grid | None, changed: Mapping[str, Box]) -> Fusion | None:
+        if not layers or lattice is None:
+            # without the reference's map it is not kept up to date
+            self._canvas = Canvas(self._config.cells)
+            return None
+        return self._canvas.update(layers, lattice, changed)
+
+    def _changes(
+        self, outcomes: Mapping[str, RobotOutcome], searched: Mapping[Pair, Trigger], jumped: Sequence[str]
+    ) -> tuple[Change, ...]:
+        shown_before = {robot: outcome.shown_pair for robot, outcome in self.result.robots.items()}
+        centres_m = {robot: known.centre_m for robot, known in self._known.items()}
+        looked = Looked(searched, jumped, shown_before)
+        changes, self._reported = changes_of(outcomes, self._reported, centres_m, looked, self._config)
+        return changes
 
 
 @dataclass(frozen=True, slots=True)
