@@ -162,6 +162,8 @@ class Pairs:
             return Trigger.RETRY
         if not watch.is_glance_due(areas_m2, config):
             return None
+        if (self.matches[pair].confidence or 0.0) >= self._config.verify.hopeful_confidence:
+            return Trigger.RETRY
         target, source = self._maps_of(pair, maps)
         if self._matcher.is_hopeful(target, source, self._config):
             return Trigger.RETRY
