@@ -113,8 +113,8 @@ class Merger:
         updates
             New maps.
         priors
-            Where robots' map frames are believed to lie in the reference's. Without a new map they change nothing, unless
-            these are the last maps.
+            Where robots' map frames are believed to lie in the reference's. Without a new map they change nothing,
+            unless these are the last maps.
         is_last
             Whether these are the last maps: whatever was only followed since it was searched is searched once more, so
             that the outcome is that of the last maps alone.
