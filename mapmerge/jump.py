@@ -38,16 +38,21 @@ def has_jumped(before: Grid, after: Grid, changed: Box | None, known_m2: float, 
         changed = Box(0, 0, *after.cells.shape)
         there = warped(Layer(before, IDENTITY), after, config.cells).tile(changed)
         old, new = np.full(changed.shape, UNKNOWN, np.int8) if there is None else there.view(np.int8), after.cells
+        # what was known beyond the new map is not among these cells
+        kept_m2 = int(np.count_nonzero((old >= 0) & (new >= 0))) * after.resolution_m**2
     else:
         around = changed.padded(math.ceil(config.verify.tolerance_m / after.resolution_m) + 2)
         old, new = _read(before, around.shifted(*offset)), _read(after, around)
-    kept_m2 = known_m2 - int(np.count_nonzero((old >= 0) & (new < 0))) * after.resolution_m**2
-    return kept_m2 < config.watch.least_kept_share * known_m2 or _contradicts(old, new, before, config)
+        kept_m2 = known_m2 - int(np.count_nonzero((old >= 0) & (new < 0))) * after.resolution_m**2
+    if kept_m2 < config.watch.least_kept_share * known_m2:
+        return True
+    walls_m = int(np.count_nonzero(before.cells >= config.cells.min_occupied_percent)) * before.resolution_m
+    return _contradicts(old, new, walls_m, after.resolution_m, config)
 
 
-def _contradicts(old: Cells, new: Cells, before: Grid, config: MergeConfig) -> bool:
+def _contradicts(old: Cells, new: Cells, walls_m: float, resolution_m: float, config: MergeConfig) -> bool:
     """Tell whether walls stand where the other map is free, and off its walls: too many of all that were there."""
-    limits, resolution_m = config.cells, before.resolution_m
+    limits = config.cells
     old_walls, new_walls = old >= limits.min_occupied_percent, new >= limits.min_occupied_percent
     gone = old_walls & (new >= 0) & (new <= limits.max_free_percent)
     came = new_walls & (old >= 0) & (old <= limits.max_free_percent)
@@ -57,8 +62,7 @@ def _contradicts(old: Cells, new: Cells, before: Grid, config: MergeConfig) -> b
     tolerance_cells = max(1.0, config.verify.tolerance_m / resolution_m)
     far = np.count_nonzero(gone & _far(new_walls, tolerance_cells))
     far += np.count_nonzero(came & _far(old_walls, tolerance_cells))
-    all_cells = np.count_nonzero(before.cells >= limits.min_occupied_percent)
-    return bool(far > 2 * max(least_cells, config.watch.jump_share * all_cells))
+    return bool(far > 2 * max(least_cells, config.watch.jump_share * walls_m / resolution_m))
 
 
 def _far(walls: Mask, distance_cells: float) -> Mask:

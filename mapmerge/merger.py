@@ -25,7 +25,7 @@ from mapmerge.plane import Box
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
-from mapmerge.unite import Unions, united
+from mapmerge.unite import Robots, Unions, united
 from mapmerge.warp import Layer
 from mapmerge.watch import Trigger
 
@@ -93,7 +93,7 @@ class Merger:
         self._known: dict[str, _Known] = {}
         self._pairs = Pairs(matcher, self._config, mapped)
         self._unions = Unions(matcher, self._config)
-        self._of_merged_maps: set[Pair] = set()
+        self._of_merged_maps: dict[Pair, tuple[Robots, Robots]] = {}
         self._canvas = Canvas(self._config.cells)
         self._reported: dict[str, Sim2] = {}
         waiting = Reason(ReasonCode.NO_MAP, "no map that shows anything yet")
@@ -113,7 +113,8 @@ class Merger:
         updates
             New maps.
         priors
-            Where robots' map frames are believed to lie in the reference's. Without a new map they change nothing.
+            Where robots' map frames are believed to lie in the reference's. Without a new map they change nothing,
+            unless these are the last maps.
         is_last
             Whether these are the last maps: whatever was only followed since it was searched is searched once more, so
             that the outcome is that of the last maps alone.
@@ -148,14 +149,14 @@ class Merger:
         return self.result
 
     @property
-    def unions(self) -> Mapping[tuple[tuple[str, ...], tuple[str, ...]], Match]:
+    def unions(self) -> Mapping[tuple[Robots, Robots], Match]:
         """What the matcher said of merged maps, by the robots of both."""
         return self._unions.matches
 
     def explain(self, pair: Pair) -> tuple[Evidence, ...]:
         """Return what the matcher saw of a pair of maps, or of those that were merged for it, as of the last step."""
         if pair in self._of_merged_maps:
-            return self._unions.explain(pair, self._maps)
+            return self._unions.explain(self._of_merged_maps[pair], self._maps)
         return self._pairs.explain(pair, self._maps)
 
     def _take(self, updates: Mapping[str, Grid]) -> tuple[tuple[str, ...], dict[str, Box]]:
@@ -194,8 +195,8 @@ class Merger:
         self._of_merged_maps.clear()
         while link := united(forest, self._maps, alone, believed, self._unions, self._config):
             matches[link.pair] = link.match
-            if link.is_of_merged_maps:
-                self._of_merged_maps.add(link.pair)
+            if link.merged is not None:
+                self._of_merged_maps[link.pair] = link.merged
             forest = _placed(centres_m, matches, self._config)
         return matches, forest
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -73,6 +73,10 @@ class PreparedMaps:
         prepared = self.get(robot, grid, resolution_m)
         self._known[robot, resolution_m] = grid, self._matcher.renewed(prepared)
 
+    def keep(self, needed: Collection[tuple[str, float]]) -> None:
+        """Forget all maps but these, each a robot and a resolution."""
+        self._known = {key: known for key, known in self._known.items() if key in needed}
+
 
 class Pairs:
     """All pairs of robots that have maps.
@@ -120,6 +124,7 @@ class Pairs:
             self._believed[pair] = priors.get(pair)
             self.matches[pair] = match
         self.matches = {pair: self.matches[pair] for pair in pairs}
+        self._prepared.keep({(robot, self._resolution_m(pair, maps)) for pair in pairs for robot in pair})
         return due
 
     def explain(self, pair: Pair, maps: Mapping[str, Grid]) -> tuple[Evidence, ...]:

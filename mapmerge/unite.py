@@ -85,13 +85,11 @@ class Unions:
         self._fresh.add(key)
         return union.match
 
-    def explain(self, pair: Pair, grids: Mapping[str, Grid]) -> tuple[Evidence, ...]:
-        """Return what the matcher saw of the merged maps in the frames of two robots."""
-        for key, union in self._known.items():
-            if (key[0][0], key[1][0]) == pair:
-                target, source = self._prepared(union.places, grids)
-                return self._matcher.explain(target, source, union.match, self._config)
-        return ()
+    def explain(self, key: tuple[Robots, Robots], grids: Mapping[str, Grid]) -> tuple[Evidence, ...]:
+        """Return what the matcher saw of two merged maps that it was asked for."""
+        union = self._known[key]
+        target, source = self._prepared(union.places, grids)
+        return self._matcher.explain(target, source, union.match, self._config)
 
     def _prepared(self, places: tuple[Placed, Placed], grids: Mapping[str, Grid]) -> list[Any]:
         merged = [_merged(placed, grids, self._config) for placed in places]
@@ -122,11 +120,19 @@ class Unions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Link:
-    """A match between two robots that others' maps made possible: merged ones, or those that agree with it."""
+    """A match between two robots that others' maps made possible: merged ones, or those that agree with it.
+
+    Parameters
+    ----------
+    pair, match
+        The robots, and what is said of them.
+    merged
+        Whose maps were merged for it; None if none were.
+    """
 
     pair: Pair
     match: Match
-    is_of_merged_maps: bool
+    merged: tuple[Robots, Robots] | None
 
 
 def components(forest: Forest) -> dict[str, Robots]:
@@ -173,9 +179,9 @@ def united(
         if max(map(len, key)) < 2 or set(between) & set(believed):
             continue
         witnessed = agreed(between, forest, grids, matches, config)
-        found = Link(*witnessed, is_of_merged_maps=False) if witnessed else None
+        found = Link(*witnessed, merged=None) if witnessed else None
         if found is None and _is_hopeful(between, matches, config):
-            found = Link((one, two), _named(unions.match(key, forest, grids), key), is_of_merged_maps=True)
+            found = Link((one, two), _named(unions.match(key, forest, grids), key), key)
         if found and found.match.accepted and (best is None or _surety(found.match) > _surety(best.match)):
             best = found
     return best

@@ -71,7 +71,7 @@ SCENARIOS: dict[str, Scenario] = {
     ),
     "restarted": Scenario(
         lambda: [seen("r1", 0.0), seen("r2", 1.0), seen("r2", 2.0, begun_anew(bare_room()))],
-        lambda last: [str(change.kind) for change in last.result.changes] == ["withdrawn"],
+        lambda last: [str(change.kind) for change in last.result.changes] == ["jumped", "withdrawn"],
     ),
     "no_reference": Scenario(
         lambda: in_log_order([seen("r1", 0.0, resolution=0.0)], growing("r2")),

@@ -112,21 +112,30 @@ def checked(match: Match) -> Match:
         assert 0.0 <= match.scores.wall_agreement <= 1.0
     if match.accepted:
         assert match.target_from_source is not None
-        assert match.evidence
     rivals = match.rivals[1:] if match.reason.code is ReasonCode.PRIOR_CONTRADICTED else match.rivals
     order = [standing(rival) for rival in rivals]
     assert order == sorted(order)
-    assert len({evidence.step for evidence in match.evidence}) == len(match.evidence)
-    for evidence in match.evidence:
-        picture = render(evidence).rgb
-        assert picture.dtype == np.uint8
-        assert picture.shape[2:] == (3,)
-        assert 0 < max(picture.shape) <= MAX_SIDE_PX
     return match
 
 
-def matched(matcher, target, source):
-    return checked(match_grids(matcher, target, source))
+def assert_told(evidence, match):
+    """Check what a method tells of a match, refused or not."""
+    assert evidence or not match.accepted
+    assert len({each.step for each in evidence}) == len(evidence)
+    for each in evidence:
+        picture = render(each).rgb
+        assert picture.dtype == np.uint8
+        assert picture.shape[2:] == (3,)
+        assert 0 < max(picture.shape) <= MAX_SIDE_PX
+
+
+def matched(matcher, target, source, prior=None):
+    """Return the match of two maps, once it and what is told of it afterwards were checked."""
+    resolution_m = max(CONFIG.search.working_cell_m, target.resolution_m, source.resolution_m)
+    maps = [matcher.prepare(grid, resolution_m, CONFIG) for grid in (target, source)]
+    match = checked(matcher.match(*maps, CONFIG, prior))
+    assert_told(matcher.explain(*maps, match, CONFIG), match)
+    return match
 
 
 def assert_right(match, pair, promise):
@@ -237,7 +246,7 @@ class TestPrior:
         pair = office_pair(2)
         true = pair.target_from_source
         prior = believed(Sim2(true.x_m + off.x_m, true.y_m + off.y_m, true.yaw_rad + off.yaw_rad))
-        match = checked(match_grids(matcher, pair.target, pair.source, prior=prior))
+        match = matched(matcher, pair.target, pair.source, prior)
         assert_right(match, pair, promise)
         assert not match.accepted or prior.allows(match.target_from_source)
 
@@ -246,7 +255,7 @@ class TestPrior:
         pair = office_pair(2)
         true = pair.target_from_source
         prior = believed(Sim2(true.x_m + off.x_m, true.y_m + off.y_m, true.yaw_rad + off.yaw_rad))
-        assert_refused(checked(match_grids(matcher, pair.target, pair.source, prior=prior)))
+        assert_refused(matched(matcher, pair.target, pair.source, prior))
 
 
 class TestRepeats:

@@ -112,10 +112,10 @@ def test_start_after_stop(replay: Program, two: Path) -> None:
 
 
 def test_a_bug_ends_with_a_status_and_a_word(replay: Program, two: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("as a bug would")
 
-    monkeypatch.setattr("replay.pipeline.step", broken)
+    monkeypatch.setattr("mapmerge.merger.Merger.step", broken)
     ran = replay.merge(two)
     assert ran.status == 3
     assert "ZeroDivisionError" in ran.err

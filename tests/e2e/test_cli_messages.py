@@ -237,6 +237,7 @@ class TestRestart:
         first, *_ = messages
         assert [(robot, event, (ns - first.log_time_ns) // 10**9) for robot, event, ns in history] == [
             ("r2", "placed", 1),
+            ("r2", "jumped", 2),
             ("r2", "withdrawn", 2),
             ("r2", "placed", 3),
         ]
@@ -253,7 +254,8 @@ class TestRestart:
         ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages))
         expected = Sim2(3.0, -2.0, 1.0) @ reference_from("r2")
         assert is_right(ran.robots["r2"]["merged_from_map"], expected)
-        assert [change["event"] for change in ran.report["history"]] == ["placed", "moved"]
+        events = [(change["robot"], change["event"]) for change in ran.report["history"]]
+        assert events == [("r2", "placed"), ("r1", "jumped"), ("r2", "moved")]
 
 
 class TestFrames:

@@ -156,7 +156,8 @@ class TestSwapped:
         pair = office_pair(3)
         for target, source in ((pair.target, pair.source), (pair.source, pair.target)):
             match = matched(target, source)
-            curves, surface, overlay = match.evidence
+            maps = [MATCHER.prepare(grid, 0.05, CONFIG) for grid in (target, source)]
+            curves, surface, overlay = MATCHER.explain(*maps, match, CONFIG)
             assert isinstance(curves, CurvesEvidence)
             assert isinstance(surface, SurfaceEvidence)
             assert isinstance(overlay, OverlayEvidence)

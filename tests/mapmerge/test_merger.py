@@ -17,6 +17,7 @@ from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import IDENTITY, Sim2
 from mapmerge.warp import Layer
+from mapmerge.watch import Trigger
 from tests.floors import errors, filled, last_map, office_pair, office_run, pair_of, with_another_label
 
 ROBOTS = ("r1", "r2", "r3", "r4")
@@ -30,11 +31,11 @@ class Session:
         self.matcher = matcher
         self.merger = Merger(robots, matcher.config)
 
-    def step(self, priors=None, **values):
+    def step(self, priors=None, *, is_last=False, **values):
         updates = {
             robot: value if isinstance(value, Grid) else self.matcher.map_of(value) for robot, value in values.items()
         }
-        result = self.merger.step(updates, priors)
+        result = self.merger.step(updates, priors, is_last=is_last)
         assert result is self.merger.result
         return result
 
@@ -124,7 +125,7 @@ class TestPlacing:
         scripted.fits(ONE, TWO, Sim2(1.0, 0.0, 0.5))
         result = session.step(r1=ONE, r2=TWO)
         (change,) = result.changes
-        assert change == Change("r2", ChangeKind.PLACED, result.robots["r2"].reason)
+        assert change == Change("r2", ChangeKind.PLACED, result.robots["r2"].reason, Trigger.FIRST)
         assert change.reason.code is ReasonCode.ACCEPTED
         assert "r1" in change.reason.message
         assert "20 fits 10" in change.reason.message
@@ -221,8 +222,9 @@ class TestWork:
         session.step(r1=ONE, r2=TWO)
         session.step(r2=THREE)
         session.step(r2=scripted.map_of(FOUR, 0.1))
-        session.step(r2=FOUR)
-        assert {value for value, _ in session.state.prepared.values()} == {ONE, FOUR}
+        session.step(r2=FOUR, is_last=True)
+        kept = session.merger._pairs._prepared._known
+        assert {prepared for _, prepared in kept.values()} == {(ONE, 0.05), (FOUR, 0.05)}
 
 
 class TestMoving:
@@ -259,7 +261,7 @@ class TestWithdrawing:
         scripted.misfits(ONE, THREE, code=ReasonCode.TOO_LITTLE_OVERLAP)
         result = session.step(r2=THREE)
         outcome = result.robots["r2"]
-        assert result.changes == (Change("r2", ChangeKind.WITHDRAWN, outcome.reason),)
+        assert result.changes == (Change("r2", ChangeKind.WITHDRAWN, outcome.reason, Trigger.CHANGED),)
         assert outcome.reason.code is ReasonCode.TOO_LITTLE_OVERLAP
         assert outcome.status is Status.UNMERGED
         assert outcome.merged_from_map is None
@@ -277,6 +279,7 @@ class TestWithdrawing:
         scripted.fits(ONE, TWO, Sim2(1.0))
         session.step(r1=ONE, r2=TWO)
         session.step(r2=THREE)
+        session.step(r2=FOUR)
         assert changes(session.step(r2=TWO)) == [("r2", ChangeKind.PLACED)]
 
     def test_when_the_reference_starts_anew_all_go(self, session, scripted):
@@ -529,7 +532,8 @@ class TestSimulated:
         result = merger.step({"r1": pair.target, "r2": pair.source})
         assert changes(result) == [("r2", ChangeKind.PLACED)]
         result = merger.step({"r2": last_map_of_a_run()})
-        assert changes(result) == [("r2", ChangeKind.WITHDRAWN)]
+        assert changes(result) == [("r2", ChangeKind.JUMPED), ("r2", ChangeKind.WITHDRAWN)]
+        assert [change.trigger for change in result.changes] == [None, Trigger.MAP_JUMPED]
         assert result.merged.same_as(pair.target.cropped_to_known())
 
 

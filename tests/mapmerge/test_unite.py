@@ -10,6 +10,7 @@ from mapmerge.config import HIGHEST_CONFIDENCE, MergeConfig, VerifyConfig
 from mapmerge.graph import Edge, place
 from mapmerge.merger import Merger
 from mapmerge.outcome import Status
+from mapmerge.pairs import News
 from mapmerge.prior import Prior
 from mapmerge.reasons import ReasonCode
 from mapmerge.sim2 import IDENTITY, Sim2
@@ -30,9 +31,9 @@ class Session:
         self.matcher = matcher
         self.merger = Merger(robots, matcher.config)
 
-    def step(self, priors=None, **values):
+    def step(self, priors=None, *, is_last=False, **values):
         updates = {robot: self.matcher.map_of(value) for robot, value in values.items()}
-        return self.merger.step(updates, priors)
+        return self.merger.step(updates, priors, is_last=is_last)
 
 
 def of_merged_maps(calls):
@@ -90,16 +91,32 @@ class TestMergedMaps:
         assert result.robots["r3"].status is Status.UNMERGED
         assert result.pairs["r1", "r3"].reason.code is ReasonCode.LOW_CONFIDENCE
 
-    def test_are_kept_without_evidence_where_refused(self, linked):
+    def test_are_what_is_explained_where_they_place_a_robot(self, linked):
+        linked.answers[ONE, THREE] = replace(linked.answers[ONE, THREE], evidence=("of the pair",))
+        linked.misfits((ONE, TWO), THREE, confidence=0.5, evidence=("of merged maps",))
         session = Session(linked)
-        linked.misfits((ONE, TWO), THREE, confidence=0.5, evidence=("seen",))
         session.step(r1=ONE, r2=TWO, r3=THREE)
-        (refused,) = session.state.unions.matches.values()
-        assert (refused.accepted, refused.evidence) == (False, ())
+        assert session.merger.explain(("r1", "r3")) == ("of the pair",)
         linked.fits((ONE, TWO), THREE, THERE, confidence=0.995)
-        linked.answers[(ONE, TWO), THREE] = replace(linked.answers[(ONE, TWO), THREE], evidence=("seen",))
-        result = Session(linked).step(r1=ONE, r2=TWO, r3=THREE)
-        assert result.pairs["r1", "r3"].evidence == ("seen",)
+        linked.answers[(ONE, TWO), THREE] = replace(linked.answers[(ONE, TWO), THREE], evidence=("of merged maps",))
+        session = Session(linked)
+        session.step(r1=ONE, r2=TWO, r3=THREE)
+        assert session.merger.explain(("r1", "r3")) == ("of merged maps",)
+        assert session.merger.explain(("r2", "r3")) == ()
+
+    def test_are_explained_by_those_that_placed_the_robot(self, linked):
+        """Others of the same two frames were merged before, and were refused."""
+        linked.misfits((ONE, TWO), THREE, confidence=0.5, evidence=("of two",))
+        linked.fits(TWO, FOUR, APART, confidence=0.999)
+        linked.fits((ONE, TWO, FOUR), THREE, THERE, confidence=0.995)
+        linked.answers[(ONE, TWO, FOUR), THREE] = replace(
+            linked.answers[(ONE, TWO, FOUR), THREE], evidence=("of three",)
+        )
+        session = Session(linked, ROBOTS)
+        session.step(r1=ONE, r2=TWO, r3=THREE)
+        result = session.step(r4=FOUR)
+        assert result.robots["r3"].status is Status.MERGED
+        assert session.merger.explain(("r1", "r3")) == ("of three",)
 
     @pytest.mark.parametrize("confidence", [None, 0.0, 0.049])
     def test_are_not_tried_without_hope(self, linked, confidence):
@@ -143,23 +160,45 @@ class TestKept:
         linked.misfits(one, three, code=ReasonCode.LOW_CONFIDENCE, confidence=0.3)
         session.step(**{robot: changed})
         assert of_merged_maps(linked.calls()) == [((one, two), three)]
-        assert len(session.state.unions.matches) == 1
+        assert len(session.merger.unions) == 1
 
     def test_until_one_moves(self, linked):
         linked.misfits((ONE, TWO), THREE, confidence=0.5)
         grids = {robot: linked.map_of(value) for robot, value in zip(ROBOTS, (ONE, TWO, THREE), strict=False)}
         matches = {("r1", "r3"): linked.answers[ONE, THREE]}
-        unions = Unions()
-        for pose, asked in ((APART, 1), (APART, 0), (Sim2(5.5), 1), (APART, 0)):
+        unions = Unions(linked, linked.config)
+        for pose, asked in ((APART, 1), (APART, 0), (Sim2(5.05), 0), (Sim2(5.5), 1), (APART, 1)):
             edge = Edge("r1", "r2", pose, 9.0, (0.0, 0.0))
             forest = place(list(grids), [edge], distance_m=0.75, angle_rad=0.1)
-            found, unions = united(forest, grids, matches, (), unions, linked, linked.config)
+            unions.update(grids, News(frozenset(), frozenset(), "r1", is_last=False))
+            found = united(forest, grids, matches, (), unions, linked.config)
             assert found is None
             assert len(of_merged_maps(linked.calls())) == asked
 
-    def test_without_those_that_changed(self, session):
-        assert session.state.unions.without(["r4"]).matches == session.state.unions.matches
-        assert session.state.unions.without(["r2"]).matches == {}
+    @pytest.mark.parametrize(("robot", "kept"), [("r4", 1), ("r2", 0), ("r3", 0)])
+    def test_until_one_jumps(self, session, robot, kept):
+        news = News(frozenset([robot]), frozenset([robot]), "r1", is_last=False)
+        session.merger._unions.update(ROBOTS, news)
+        assert len(session.merger.unions) == kept
+
+    @pytest.mark.parametrize(("robot", "kept"), [("r4", 1), ("r2", 0), ("r3", 0)])
+    def test_until_one_is_gone(self, session, robot, kept):
+        news = News(frozenset([robot]), frozenset(), "r1", is_last=False)
+        session.merger._unions.update(set(ROBOTS) - {robot}, news)
+        assert len(session.merger.unions) == kept
+
+    def test_that_are_refused_again_and_again_are_asked_for_less_often(self, linked):
+        """After 1, 2, 4, … updates; and by the last maps, once more."""
+        linked.misfits((ONE, TWO), THREE, confidence=0.5)
+        session, asked = Session(linked), []
+        for update in range(12):
+            value = THREE + update
+            linked.misfits(ONE, value, code=ReasonCode.LOW_CONFIDENCE, confidence=0.3)
+            linked.misfits((ONE, TWO), value, confidence=0.5)
+            session.step(is_last=update == 11, **({"r1": ONE, "r2": TWO} if update == 0 else {}), r3=value)
+            if of_merged_maps(linked.calls()):
+                asked.append(update)
+        assert asked == [0, 1, 3, 7, 11]
 
 
 class TestWitnesses:

@@ -96,8 +96,17 @@ def test_history() -> None:
     ]
     reports = reported(*steps)
     events = [(change["stamp_ns"], change["robot"], change["event"]) for change in reports[-1]["history"]]
-    assert events == [(0, "r2", "placed"), (1, "r2", "moved"), (2, "r2", "withdrawn"), (3, "r2", "placed")]
-    assert [len(report["history"]) for report in reports] == [1, 2, 3, 4]
+    assert events == [
+        (0, "r2", "placed"),
+        (1, "r2", "jumped"),
+        (1, "r2", "moved"),
+        (2, "r2", "jumped"),
+        (2, "r2", "withdrawn"),
+        (3, "r2", "placed"),
+    ]
+    assert [len(report["history"]) for report in reports] == [1, 3, 5, 6]
+    triggers = [change["trigger"] for change in reports[-1]["history"]]
+    assert triggers == ["first", None, "map_jumped", None, "map_jumped", "retry"]
     assert reports[-1]["robots"]["r2"]["first_merged_stamp_ns"] == 0
 
 

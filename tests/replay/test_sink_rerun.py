@@ -232,6 +232,7 @@ def test_decisions_say_what_happened_and_why(recording: Path) -> None:
     expected = [
         (STAMPS[2], "WARN", "r4: a message of /r4/map was skipped: it has 0 × 0 cells"),
         (STAMPS[2], "INFO", "r2 placed on r1: "),
+        (STAMPS[4], "WARN", "the map of r2 jumped in its own frame"),
         (STAMPS[4], "WARN", "r2 is withdrawn: not placed on "),
         (STAMPS[5], "INFO", "r2 placed on r1: "),
         (STAMPS[5], "WARN", "end: 2 of 4 robots are in the merged map"),
