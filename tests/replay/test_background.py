@@ -26,10 +26,9 @@ class TestReadAhead:
             yield 2
             raise ValueError("the third")
 
-        seen = []
+        seen: list[int] = []
         with pytest.raises(ValueError, match="the third"), ReadAhead(failing()) as items:
-            for item in items:
-                seen.append(item)  # noqa: PERF402 - what came before the error is what matters
+            seen.extend(items)
         assert seen == [1, 2]
         assert not threads()
 
@@ -56,9 +55,13 @@ class TestReadAhead:
             finally:
                 closed.append(threading.current_thread().name)
 
-        with pytest.raises(KeyError), ReadAhead(endless()) as items:
-            next(items)
-            raise KeyError
+        def left_early() -> None:
+            with ReadAhead(endless()) as items:
+                next(items)
+                raise KeyError
+
+        with pytest.raises(KeyError):
+            left_early()
         assert closed == ["reader"]
         assert not threads()
 
