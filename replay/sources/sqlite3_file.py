@@ -56,7 +56,8 @@ class Sqlite3File(Closing):
             _check_whole(path.resolve(), self.path)
             # Immutable, so that not even a lock file is left beside the recording.
             uri = f"{path.resolve().as_uri()}?mode=ro&immutable=1"
-            self._database = stack.enter_context(closing(sqlite3.connect(uri, uri=True)))
+            # opened in one thread and read in another, but never in two at once
+            self._database = stack.enter_context(closing(sqlite3.connect(uri, uri=True, check_same_thread=False)))
             if self._database.execute(_TABLES).fetchone() != (2,):
                 raise InputError(
                     f"{self.path}: this SQLite file is no ROS 2 bag: 'topics' and 'messages' were expected"
