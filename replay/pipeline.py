@@ -9,6 +9,7 @@ from time import perf_counter
 
 from mapmerge.errors import MapMergeError
 from mapmerge.merger import Merger
+from mapmerge.prior import Prior
 from replay import __version__
 from replay.arrivals import Tally
 from replay.background import Courier, ReadAhead
@@ -32,6 +33,7 @@ def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
     tallies = tuple(Tally() for _ in feeds)
     inputs = plan.describe_inputs()
     done, total, stamp_ns = 0, sum(item.message_count for item in plan.robots), None
+    priors: dict[str, Prior] = {}
 
     yield Started(plan.robots, settings, inputs)
     yield from _noted(report, beliefs.foreseen())
@@ -49,8 +51,10 @@ def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
                 report.skip(tick)
                 yield tick
                 continue
-            priors, notes = beliefs.now()
-            yield from _noted(report, notes)
+            if tick.grids:
+                # one without maps ends the run; what was recorded after the last maps is too late for them
+                priors, notes = beliefs.now()
+                yield from _noted(report, notes)
             begin = perf_counter()
             try:
                 result = merger.step(tick.grids, priors, is_last=tick.is_last)
