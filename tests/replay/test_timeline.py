@@ -9,7 +9,7 @@ from mapmerge.grid import Grid
 from replay.arrivals import Feed, Tally, Window
 from replay.errors import InputError
 from replay.events import Clock, Skipped
-from replay.timeline import Tick, Transforms, ticks
+from replay.timeline import _MOST_HELD, Tick, Transforms, ticks
 from tests.bags import SECOND, START, Recorded, as_cdr
 from tests.fakes import FakeSource
 from tests.floors import filled
@@ -271,6 +271,60 @@ class TestBadMessages:
     def test_are_no_tick(self) -> None:
         found, _ = run(feed(*bad_messages("r1", 1.0).values()))
         assert all(isinstance(item, Skipped) for item in found)
+
+
+class TestLast:
+    MAPS = (mapped("r1", 0.0, 1), mapped("r1", 2.0, 2))
+
+    @staticmethod
+    def are_last(found: Sequence[Tick | Skipped | Transforms]) -> list[bool]:
+        return [item.is_last for item in found if isinstance(item, Tick)]
+
+    @pytest.mark.parametrize("count", [1, 2, 5])
+    def test_only_the_last_tick_says_that_it_is(self, count: int) -> None:
+        found, _ = run(feed(*(mapped("r1", index, index) for index in range(count))))
+        assert self.are_last(found) == [False] * (count - 1) + [True]
+        assert told(found)[-1] == (count - 1.0, {"r1": count - 1})
+
+    def test_of_several_recordings(self) -> None:
+        found, _ = run(feed(*self.MAPS), feed(mapped("r2", 1.0, 5), mapped("r2", 2.0, 6)))
+        assert told(found)[-1] == (2.0, {"r1": 2, "r2": 6})
+        assert self.are_last(found) == [False, False, True]
+
+    def test_whatever_else_comes_after_it(self) -> None:
+        bad = bad_messages("r1", 3.0).values()
+        moving = transforms(*(linked(seconds, link("w", "a")) for seconds in (1.0, 4.0)))
+        found, _ = run(feed(*self.MAPS, *bad), moving)
+        assert self.are_last(found) == [False, True]
+        assert told(found)[:3] == [(0.0, {"r1": 1}), "1: a", (2.0, {"r1": 2})]
+        assert len(found) == 4 + len(bad)
+
+    @pytest.mark.parametrize("count", [_MOST_HELD - 1, _MOST_HELD, 3 * _MOST_HELD])
+    def test_if_too_much_comes_after_it_a_tick_without_maps_ends_the_run(self, count: int) -> None:
+        moving = transforms(*(linked(3.0 + index, link("w", f"{index}")) for index in range(count)))
+        found, _ = run(feed(*self.MAPS), moving)
+        assert [item.split()[-1] for item in told(found) if isinstance(item, str)] == [str(i) for i in range(count)]
+        ticks_found = [item for item in found if isinstance(item, Tick)]
+        assert sum(item.messages for item in ticks_found) == 2
+        assert [item.stamp_ns for item in ticks_found] == [at(0.0), at(2.0), at(2.0)][: len(ticks_found)]
+        if count < _MOST_HELD:
+            assert self.are_last(found) == [False, True]
+        else:
+            assert self.are_last(found) == [False, False, True]
+            assert found[-1] is ticks_found[-1]
+            assert ticks_found[-1].grids == {}
+
+    def test_however_much_comes_before_it(self) -> None:
+        moving = transforms(*(linked(0.001 * index, link("w", "a")) for index in range(1, 2 * _MOST_HELD)))
+        found, _ = run(feed(mapped("r1", 0.0, 1), mapped("r1", 9.0, 2)), moving)
+        assert self.are_last(found) == [False, True]
+        assert told(found)[-1] == (9.0, {"r1": 2})
+
+    def test_without_any_map_there_is_none(self) -> None:
+        for count in (1, 2 * _MOST_HELD):
+            found, _ = run(transforms(*(linked(float(index), link("w", "a")) for index in range(count))))
+            assert len(found) == count
+            assert self.are_last(found) == []
 
 
 def test_every_message_is_counted_once() -> None:
