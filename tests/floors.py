@@ -60,12 +60,19 @@ class Pair:
 
 @functools.cache
 def office_run(
-    seed: int, lo: float, hi: float, heading_rad: float, noise: int, resolution_m: float = 0.05, maps: int = 3
+    seed: int,
+    lo: float,
+    hi: float,
+    heading_rad: float,
+    noise: int,
+    resolution_m: float = 0.05,
+    maps: int = 3,
+    people: int = 0,
 ) -> Run:
     """Return a robot's run through a strip of a small office floor; ``noise`` seeds the robot's own errors."""
     world = office_floor(seed, SMALL)
     places = window(stops(world, survey(world)), lo, hi, direction_rad=0.2)
-    return _run(world, places, heading_rad, noise, resolution_m, maps)
+    return _run(world, places, heading_rad, noise, resolution_m, maps, people=people)
 
 
 @functools.cache
@@ -78,12 +85,12 @@ def corridor_run(first_bay: int, last_bay: int, heading_rad: float, noise: int) 
     return _run(world, places, heading_rad, noise, 0.05, 2, max_range_m=3.5)
 
 
-def _run(world, places, heading_rad, noise, resolution_m, maps, max_range_m=8.0):
+def _run(world, places, heading_rad, noise, resolution_m, maps, max_range_m=8.0, people=0):
     terrain = survey(world)
     pace = Pace(speed_m_s=1.0, turn_rad_s=1.8)
     poses = follow(route(terrain, tour(world, places)), heading_rad, pace)
     lidar = Lidar(beams_per_turn=360, max_range_m=max_range_m)
-    robot = Robot(lidar=lidar, pace=pace, model=SensorModel(resolution_m=resolution_m))
+    robot = Robot(lidar=lidar, pace=pace, model=SensorModel(resolution_m=resolution_m), people=people)
     return explore(world, poses, robot, maps, np.random.default_rng([noise, 5]))
 
 

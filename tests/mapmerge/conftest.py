@@ -16,7 +16,10 @@ from mapmerge.verify import Scores
 
 
 class ScriptedMatcher(Matcher):
-    """Knows maps by the value that fills them, merged maps by the values of all, and counts what it is asked."""
+    """Knows maps by the value that fills them, merged maps by the values of all, and counts what it is asked.
+
+    It follows no placement, and has hope for all maps, unless a test says otherwise.
+    """
 
     config = MergeConfig(method="scripted")
 
@@ -25,6 +28,10 @@ class ScriptedMatcher(Matcher):
         self.prepared = []
         self.matched = []
         self.priors = []
+        self.followed = []
+        self.glanced = []
+        self.is_hope = True
+        self.follows = lambda _: None
 
     def map_of(self, value, resolution_m=0.05):
         return Grid(np.full((20, 20), value, np.int8), resolution_m)
@@ -70,6 +77,17 @@ class ScriptedMatcher(Matcher):
         self.priors.append(prior)
         nothing = Reason(ReasonCode.NO_CANDIDATE, f"nothing is known of {pair}")
         return self.answers.get(pair, Match(None, None, accepted=False, reason=nothing))
+
+    def follow(self, target, source, known, config, prior=None):
+        assert config is self.config
+        self.followed.append((target[0], source[0]))
+        self.priors.append(prior)
+        return self.follows(known)
+
+    def is_hopeful(self, target, source, config):
+        assert config is self.config
+        self.glanced.append((target[0], source[0]))
+        return self.is_hope
 
     def calls(self):
         """Return what was matched since the last call."""
