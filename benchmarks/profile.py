@@ -3,13 +3,12 @@
 `py-spy` samples the program a hundred times a second and writes the flame graph, which any browser shows. The table of
 parts is of the same samples: each belongs to the innermost function on its stack that `PARTS` knows, but all below one
 of a part in `WHOLE` to that. Work of libraries goes to whoever called them. Samples are wall time while Python
-or what it called was running; OpenCV uses one thread.
+or what it called was running, in one thread (``--jobs 1``).
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import re
 import subprocess
 import sys
@@ -32,7 +31,7 @@ PARTS: Mapping[str, str] = {
     r"\(replay/(codec/de|assemble|arrivals|timeline)": "decoding, putting in order",
     r"\bprepare \(mapmerge/|\(mapmerge/(prepare|walls)\.py": PREPARING,
     r"\(mapmerge/(match/|pairs|jump|watch|align|polish|score|verify|graph|unite)": "matching",
-    r"\(mapmerge/fuse": "fusing",
+    r"\(mapmerge/(fuse|odds|warp)": "fusing",
     r"\(mapmerge/merger": "rest of the merger",
     r"\(mapmerge/outcome|\(replay/report|\(json/": "report",
     r"\(replay/gallery|\(mapmerge/render": IMAGES,
@@ -97,11 +96,21 @@ def sample(recording: Path, flame_graph: Path, flags: Sequence[str]) -> None:
         If the replay, or the sampling of it, fails.
     """
     program = Path(sysconfig.get_path("scripts")) / "py-spy"
-    environment = {**os.environ, "OPENCV_FOR_THREADS_NUM": "1"}
     with TemporaryDirectory() as folder:
-        replay = [sys.executable, "-c", _SCRIPT, "merge", str(recording), "-o", f"{folder}/out.mcap", *flags]
+        replay = [
+            sys.executable,
+            "-c",
+            _SCRIPT,
+            "merge",
+            str(recording),
+            "-o",
+            f"{folder}/out.mcap",
+            "--jobs",
+            "1",
+            *flags,
+        ]
         command = [str(program), "record", "--format", "flamegraph", "--output", str(flame_graph), "--", *replay]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
         if not Path(folder, "out.mcap").exists() or not flame_graph.exists():
             raise RuntimeError(f"{' '.join(command)}: {done.stderr.strip()}")
 

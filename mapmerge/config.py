@@ -104,7 +104,7 @@ class SearchConfig(Settings):
     free_weights: tuple[float, ...] = (0.5, 1.8)
     shifts: int = 8
     peak_distance_m: float = 0.8
-    max_side_cells: int = 1500
+    max_side_cells: int = 1000
     max_candidates: int = 40
     sweep_step_rad: float = math.radians(2.5)
     sweep_cell_m: float = 0.25
@@ -281,8 +281,8 @@ class WatchConfig(Settings):
     likeness_rise: float = 0.1
     glance_growth: float = 1.15
     longest_glance_wait: int = 16
-    search_growth: float = 2.0
-    longest_search_wait: int = 64
+    search_growth: float = 3.0
+    longest_search_wait: int = 100
     hopeful_odds: float = 0.05
     hold_cells: float = 0.5
     jump_share: float = 0.05

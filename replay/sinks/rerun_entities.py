@@ -6,7 +6,7 @@
     ├── map                         the merged map
     ├── robots/<robot>              merged_from_map or, of a map that is not placed, where it is parked
     │   ├── map                     the robot's own map
-    │   ├── walls                   its occupied cells in the robot's colour
+    │   ├── walls/<tile>            its occupied cells in the robot's colour
     │   └── outline                 the box of what it knows
     └── labels/<robot>              its name; of a map that is not placed, also why
     evidence/<robot>/<step>         pictures of the match that placed the robot, or of its best refused one
@@ -83,7 +83,7 @@ class RobotEntities:
 
     @property
     def walls(self) -> EntityPath:
-        """Its occupied cells."""
+        """Parent of its occupied cells, which are logged tile by tile."""
         return [*self.frame, "walls"]
 
     @property

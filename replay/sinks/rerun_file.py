@@ -34,7 +34,7 @@ class RerunSink:
             self._file.partial.touch()
 
     def take(self, event: Event) -> None:
-        """Log what happened; it is in the file when this returns."""
+        """Log what happened; the library writes it to the file in the meantime."""
         with output_errors(self._file.path, RuntimeError):
             if isinstance(event, Started):
                 self._writer = _Writer(self._file.partial, event)
@@ -103,7 +103,6 @@ class _Writer:
         for entry in text.decisions(event.result):
             self._say(entry)
         self._show_table(event.report)
-        self.stream.flush()
 
     def _take_finished(self, event: Finished) -> None:
         self._say_waiting()

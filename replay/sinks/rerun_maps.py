@@ -14,26 +14,24 @@ from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
 from mapmerge.merger import MergeResult
 from mapmerge.outcome import RobotOutcome, Status
+from mapmerge.plane import Box
 from mapmerge.resample import at_resolution
 from mapmerge.sim2 import Points, Sim2
-from mapmerge.walls import thinned
 from replay.sinks.rerun_entities import MERGED, MERGED_MAP, EntityPath, RobotEntities
-from replay.sinks.rerun_layout import Box, Layout, PointM, lay_out
+from replay.sinks.rerun_layout import Box as Extent
+from replay.sinks.rerun_layout import Layout, PointM, lay_out
 from replay.sinks.rerun_stream import RrdStream
+from replay.sinks.rerun_walls import WallScene
 
 # A texture of a graphics card has at most so many pixels on a side; larger maps are shown coarser.
 MAX_SIDE_CELLS = 8192
-_POINTS_ACROSS = 2000
+_BAND_CELLS = 256
 
 # Heights in metres above the merged map, of which what lies on it is seen from above.
 _OUTLINE_Z_M = 0.02
-_WALLS_Z_M = 0.04
 _LABEL_Z_M = 0.5
-_STEP_Z_M = 0.005
 
-# Sizes in points of the screen, which the library tells from metres by their sign.
-_REFERENCE_WALL_RADIUS = rr.Radius.ui_points(1.4)
-_WALL_RADIUS = rr.Radius.ui_points(0.75)
+# In points of the screen, which the library tells from metres by their sign.
 _OUTLINE_RADIUS = rr.Radius.ui_points(0.75)
 
 _LABEL_WIDTH = 34
@@ -67,11 +65,12 @@ class MapScene:
         self._cells = cells
         self._merged: Grid | None = None
         self._shown = {entities.robot: _Shown() for entities in robots}
-        self._extent: Box | None = None
+        self._walls = {entities.robot: WallScene(stream, entities, cells) for entities in robots}
+        self._extent: Extent | None = None
         stream.log(MERGED, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
     @property
-    def extent(self) -> Box | None:
+    def extent(self) -> Extent | None:
         """What all maps cover now; None without maps."""
         return self._extent
 
@@ -89,48 +88,32 @@ class MapScene:
             self._show_label(entities, result.robots[entities.robot], layout)
 
     def _show_merged(self, merged: Grid | None) -> None:
-        if merged is None or merged is self._merged:
-            return
-        if self._merged is None or not merged.same_as(self._merged):
+        if merged is not None and merged is not self._merged:
             self._log_grid(MERGED_MAP, merged, draw_order=1.0)
-        self._merged = merged
+            self._merged = merged
 
     def _show_map(self, entities: RobotEntities, grid: Grid) -> None:
         """Log a robot's own map, cropped to what it knows, so that it lies within the merged map once it is placed."""
         known = grid.cropped_to_known()
         shown = self._shown[entities.robot]
         self._log_grid(entities.map, known, draw_order=0.0)
+        self._walls[entities.robot].show(known)
         if known.cells.size == 0:
             shown.corners_m = None
-            for path in (entities.walls, entities.outline):
-                self._stream.log(path, rr.Clear(recursive=False))
+            self._stream.log(entities.outline, rr.Clear(recursive=False))
             return
-        shown.corners_m = _corners_m(known)
-        self._log_walls(entities, known)
+        corners_m = _corners_m(known)
+        if shown.corners_m is None or not np.array_equal(shown.corners_m, corners_m):
+            self._log_outline(entities, corners_m)
+        shown.corners_m = corners_m
+
+    def _log_outline(self, entities: RobotEntities, corners_m: Points) -> None:
         self._stream.log(
             entities.outline,
             rr.LineStrips3D(
-                [_raised(np.vstack([shown.corners_m, shown.corners_m[:1]]), _OUTLINE_Z_M)],
+                [_raised(np.vstack([corners_m, corners_m[:1]]), _OUTLINE_Z_M)],
                 radii=_OUTLINE_RADIUS,
                 colors=[entities.colour],
-            ),
-        )
-
-    def _log_walls(self, entities: RobotEntities, known: Grid) -> None:
-        walls_m = known.centres_m(known.cells >= self._cells.min_occupied_percent)
-        spacing_m = max(known.rows, known.cols) * known.resolution_m / _POINTS_ACROSS
-        if spacing_m > known.resolution_m:
-            walls_m = thinned(walls_m, spacing_m)
-        height_m = _WALLS_Z_M + _STEP_Z_M * entities.index
-        # The reference's walls are drawn wide, so that those of the others are seen on them.
-        radius = _WALL_RADIUS if entities.index else _REFERENCE_WALL_RADIUS
-        self._stream.log(
-            entities.walls,
-            rr.Points3D(
-                _raised(walls_m, height_m),
-                radii=radius,
-                colors=[entities.colour],
-                point_shading=rr.components.PointShading.Flat,
             ),
         )
 
@@ -138,8 +121,7 @@ class MapScene:
         if grid.cells.size == 0:
             self._stream.log(path, rr.Clear(recursive=False))
             return
-        factor = math.ceil(max(grid.rows, grid.cols) / MAX_SIDE_CELLS)
-        shown = at_resolution(grid, grid.resolution_m * factor, self._cells)
+        shown = _shrunk(grid, self._cells)
         pose = shown.map_from_grid
         self._stream.log(
             path,
@@ -197,6 +179,19 @@ def _label(robot: str, outcome: RobotOutcome) -> str:
         return f"{robot} (reference)" if outcome.status is Status.REFERENCE else robot
     lines = textwrap.wrap(outcome.reason.message, _LABEL_WIDTH)
     return "\n".join([f"{robot} is not merged:", *lines])
+
+
+def _shrunk(grid: Grid, cells: CellConfig) -> Grid:
+    """Return a map so coarse that it can be shown; it is pooled band by band, so that memory is that of a band."""
+    factor = math.ceil(max(grid.cells.shape) / MAX_SIDE_CELLS)
+    if factor == 1:
+        return grid
+    resolution_m, whole = grid.resolution_m * factor, Box(0, 0, *grid.cells.shape)
+    parts = [
+        at_resolution(Grid(grid.cells[band.slices(whole)], grid.resolution_m), resolution_m, cells).cells
+        for band in whole.bands(_BAND_CELLS * factor)
+    ]
+    return Grid(np.concatenate(parts), resolution_m, grid.map_from_grid)
 
 
 def _corners_m(grid: Grid) -> Points:

@@ -23,6 +23,9 @@ leaves out whatever is called log_time."""
 _PATIENCE_S = 3.0
 _NEVER = timedelta(days=365)
 _NO_LIMIT = 1 << 40
+_CHUNK_BYTES = 1 << 20
+_MOST_WAITING_BYTES = 16 << 20
+_ROW_BYTES = 256
 
 
 class RrdStream:
@@ -45,8 +48,9 @@ class RrdStream:
 
     def __init__(self, path: Path, recording_id: UUID) -> None:
         self._path = path
-        # Rows go to chunks when `flush` says so and never by the clock, so that two runs have the same chunks.
-        batching = rr.ChunkBatcherConfig(_NEVER, _NO_LIMIT, _NO_LIMIT)
+        # Rows go to chunks by their size and never by the clock, so that two runs have the same chunks. Of each chunk
+        # something is kept until the end, so small rows share one.
+        batching = rr.ChunkBatcherConfig(_NEVER, _CHUNK_BYTES, _NO_LIMIT)
         self._recording = rr.RecordingStream(
             APPLICATION, recording_id=recording_id, send_properties=False, batcher_config=batching
         )
@@ -54,6 +58,7 @@ class RrdStream:
         self._recording.set_log_tick_enabled(False)
         self._recording.save(path)
         self._ticks = 0
+        self._waiting_bytes = 0
         self._broken = False
 
     def at(self, stamp_ns: int) -> None:
@@ -63,8 +68,21 @@ class RrdStream:
         self._ticks += 1
 
     def log(self, path: Sequence[str], *content: rr.AsComponents, static: bool = False) -> None:
-        """Log to an entity, whose path is given in parts that need no escaping."""
-        self._recording.log(list(path), *content, static=static)
+        """Log to an entity, whose path is given in parts that need no escaping.
+
+        It is written by a thread of the library; when too much waits for that, all of it is waited for.
+
+        Raises
+        ------
+        RuntimeError
+            If what was logged before cannot be written.
+        """
+        batches = [batch for item in content for batch in item.as_component_batches()]
+        size_bytes = _ROW_BYTES + sum(batch.as_arrow_array().nbytes for batch in batches)
+        if self._waiting_bytes + size_bytes > _MOST_WAITING_BYTES:
+            self.flush()
+        self._waiting_bytes += size_bytes
+        self._recording.log(list(path), batches, static=static)
 
     def send(self, blueprint: rrb.Blueprint) -> None:
         """Add what the viewer shows when the file is opened."""
@@ -80,6 +98,7 @@ class RrdStream:
         """
         # The library's writer is a thread. When it fails, on a full disk say, whatever waits for it waits for ever:
         # so wait only while the file grows.
+        self._waiting_bytes = 0
         size = self._path.stat().st_size
         while True:
             try:
