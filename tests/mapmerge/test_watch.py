@@ -19,6 +19,7 @@ ROBOTS = ("r1", "r2", "r3", "r4")
 VALUES = dict(zip(ROBOTS, (10, 20, 30, 40), strict=True))
 ONE_TWO, ONE_THREE, TWO_THREE = ("r1", "r2"), ("r1", "r3"), ("r2", "r3")
 CELLS = 400
+LIMITS = WatchConfig()
 HERE = Sim2(1.0, 2.0, 0.3)
 REFUSED = Reason(ReasonCode.WALLS_DISAGREE, "as the test says")
 
@@ -259,7 +260,8 @@ class TestRefused:
 
     def test_but_never_starve(self, refused, scripted):
         scripted.is_hope = False
-        assert due(refused, 200) == [64, 128, 192]
+        wait = LIMITS.longest_search_wait
+        assert due(refused, 3 * wait) == [wait, 2 * wait, 3 * wait]
 
     def test_at_the_latest_after_as_many_updates_as_are_set(self, scripted):
         scripted.config = MergeConfig(
@@ -272,12 +274,13 @@ class TestRefused:
         scripted.is_hope = True
         assert due(session, 8) == [1, 3, 5, 7]
 
-    @pytest.mark.parametrize(("cells", "is_due"), [(799, False), (801, True)])
+    @pytest.mark.parametrize(("more", "is_due"), [(-1, False), (1, True)])
     @pytest.mark.parametrize("robot", ["r1", "r2"])
-    def test_are_searched_once_one_has_doubled(self, refused, scripted, cells, is_due, robot):
+    def test_are_searched_once_one_has_grown_much(self, refused, scripted, more, is_due, robot):
         scripted.is_hope = False
         due(refused, 31)
         refused.step(robot, cells=500)
+        cells = round(LIMITS.search_growth * CELLS) + more
         assert refused.step(robot, cells=cells) == ({ONE_TWO: Trigger.RETRY} if is_due else {})
 
     @pytest.mark.parametrize(("cells", "is_due"), [(459, False), (461, True)])
