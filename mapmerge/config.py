@@ -255,6 +255,8 @@ class WatchConfig(Settings):
     ----------
     overlap_growth
         A placement is searched anew once its maps share so many times as much as at the last search.
+    map_growth
+        Or once one of them knows so many times as much, or after `longest_search_wait` updates.
     agreement_drop
         Or once the share of the walls that agree has fallen by this.
     likeness_rise
@@ -277,6 +279,7 @@ class WatchConfig(Settings):
     """
 
     overlap_growth: float = 1.5
+    map_growth: float = 1.5
     agreement_drop: float = 0.05
     likeness_rise: float = 0.1
     glance_growth: float = 1.15

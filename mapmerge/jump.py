@@ -15,12 +15,13 @@ from mapmerge.config import MergeConfig
 from mapmerge.grid import UNKNOWN, Cells, Grid, Mask
 from mapmerge.lattice import offset_cells
 from mapmerge.plane import Box
+from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import IDENTITY
 from mapmerge.warp import Layer, warped
 
 
-def has_jumped(before: Grid, after: Grid, changed: Box | None, known_m2: float, config: MergeConfig) -> bool:
-    """Tell whether a robot's new map contradicts the one before it by more than a SLAM's growth explains.
+def jump(before: Grid, after: Grid, changed: Box | None, known_m2: float, config: MergeConfig) -> Reason | None:
+    """Return how a robot's new map contradicts the one before it, if it does by more than a SLAM's growth explains.
 
     Parameters
     ----------
@@ -45,24 +46,30 @@ def has_jumped(before: Grid, after: Grid, changed: Box | None, known_m2: float, 
         old, new = _read(before, around.shifted(*offset)), _read(after, around)
         kept_m2 = known_m2 - int(np.count_nonzero((old >= 0) & (new < 0))) * after.resolution_m**2
     if kept_m2 < config.watch.least_kept_share * known_m2:
-        return True
+        message = f"of the {known_m2:.0f} m² that it knew before it still knows {kept_m2:.0f} m²"
+        return Reason(ReasonCode.MAP_JUMPED, message)
+    contradicted_m = _contradicted_cells(old, new, after.resolution_m, config) * after.resolution_m
+    if contradicted_m <= config.verify.min_matched_wall_m:
+        return None
     walls_m = int(np.count_nonzero(before.cells >= config.cells.min_occupied_percent)) * before.resolution_m
-    return _contradicts(old, new, walls_m, after.resolution_m, config)
+    if contradicted_m <= config.watch.jump_share * walls_m:
+        return None
+    message = f"{contradicted_m / walls_m:.0%} of its walls contradict what it was before"
+    return Reason(ReasonCode.MAP_JUMPED, message)
 
 
-def _contradicts(old: Cells, new: Cells, walls_m: float, resolution_m: float, config: MergeConfig) -> bool:
-    """Tell whether walls stand where the other map is free, and off its walls: too many of all that were there."""
+def _contradicted_cells(old: Cells, new: Cells, resolution_m: float, config: MergeConfig) -> float:
+    """Return how many cells of wall stand where the other map is free, and off its walls, mean of both directions."""
     limits = config.cells
     old_walls, new_walls = old >= limits.min_occupied_percent, new >= limits.min_occupied_percent
     gone = old_walls & (new >= 0) & (new <= limits.max_free_percent)
     came = new_walls & (old >= 0) & (old <= limits.max_free_percent)
-    least_cells = config.verify.min_matched_wall_m / resolution_m
-    if np.count_nonzero(gone) + np.count_nonzero(came) <= 2 * least_cells:
-        return False
+    most = (int(np.count_nonzero(gone)) + int(np.count_nonzero(came))) / 2
+    if most * resolution_m <= config.verify.min_matched_wall_m:
+        return most
     tolerance_cells = max(1.0, config.verify.tolerance_m / resolution_m)
-    far = np.count_nonzero(gone & _far(new_walls, tolerance_cells))
-    far += np.count_nonzero(came & _far(old_walls, tolerance_cells))
-    return bool(far > 2 * max(least_cells, config.watch.jump_share * walls_m / resolution_m))
+    far_gone, far_came = gone & _far(new_walls, tolerance_cells), came & _far(old_walls, tolerance_cells)
+    return (int(np.count_nonzero(far_gone)) + int(np.count_nonzero(far_came))) / 2
 
 
 def _far(walls: Mask, distance_cells: float) -> Mask:

@@ -16,7 +16,7 @@ from mapmerge.evidence import Evidence
 from mapmerge.fuse import Canvas, Fusion
 from mapmerge.graph import Edge, Forest, place
 from mapmerge.grid import Grid
-from mapmerge.jump import has_jumped
+from mapmerge.jump import jump
 from mapmerge.lattice import changed_box
 from mapmerge.match import Match, load_matcher
 from mapmerge.outcome import Change, Looked, Pair, RobotOutcome, Status, changes_of, outcomes_of
@@ -139,6 +139,7 @@ class Merger:
         news = News(frozenset(updated), frozenset(jumped), robots[0], is_last)
         searched = self._search(believed, news)
         matches, forest = self._linked(believed)
+        searched = self._searched(searched)
         pairs = _without_contradicted(matches, forest)
         layers = _layers(robots[0], self._maps, forest)
         fusion = self._fused(layers, grids.get(robots[0]), changed)
@@ -154,14 +155,17 @@ class Merger:
         return self._unions.matches
 
     def explain(self, pair: Pair) -> tuple[Evidence, ...]:
-        """Return what the matcher saw of a pair of maps, or of those that were merged for it, as of the last step."""
+        """Return what the matcher saw of a pair of maps, or of those that were merged for it, as of the last step.
+
+        What it holds of the maps may be changed by the next step.
+        """
         if pair in self._of_merged_maps:
             return self._unions.explain(self._of_merged_maps[pair], self._maps)
         return self._pairs.explain(pair, self._maps)
 
-    def _take(self, updates: Mapping[str, Grid]) -> tuple[tuple[str, ...], dict[str, Box]]:
+    def _take(self, updates: Mapping[str, Grid]) -> tuple[dict[str, Reason], dict[str, Box]]:
         """Take in maps that are new; return whose map jumped, and which cells changed where that can be said."""
-        jumped: list[str] = []
+        jumped: dict[str, Reason] = {}
         changed: dict[str, Box] = {}
         for robot, grid in updates.items():
             after = grid.cropped_to_known()
@@ -174,17 +178,24 @@ class Merger:
             box = changed_box(before, after)
             if box is not None:
                 changed[robot] = box
-            if has_jumped(before, after, box, known.area_m2, self._config):
-                jumped.append(robot)
+            reason = jump(before, after, box, known.area_m2, self._config)
+            if reason is not None:
+                jumped[robot] = reason
         # in the order of the robots, whenever their maps came
         self._maps = {robot: self._maps[robot] for robot in self.result.robots if robot in self._maps}
-        return tuple(jumped), changed
+        return jumped, changed
 
     def _search(self, believed: Mapping[Pair, Prior], news: News) -> dict[Pair, Trigger]:
         """Bring the matches of pairs up to date; return which were searched, and why."""
         areas_m2 = {robot: known.area_m2 for robot, known in self._known.items()}
         self._unions.update(self._maps, news)
         return self._pairs.update(self._maps, areas_m2, believed, news)
+
+    def _searched(self, searched: Mapping[Pair, Trigger]) -> dict[Pair, Trigger]:
+        """Return why pairs were searched; of those whose match is that of merged maps, why these were."""
+        of_unions = {pair: self._unions.searched.get(key) for pair, key in self._of_merged_maps.items()}
+        both = {**searched, **of_unions}
+        return {pair: trigger for pair, trigger in both.items() if trigger is not None}
 
     def _linked(self, believed: Mapping[Pair, Prior]) -> tuple[dict[Pair, Match], Forest]:
         """Place robots by the matches of pairs, then those that only merged maps can place, one after the other."""
@@ -208,7 +219,7 @@ class Merger:
         return self._canvas.update(layers, lattice, changed)
 
     def _changes(
-        self, outcomes: Mapping[str, RobotOutcome], searched: Mapping[Pair, Trigger], jumped: Sequence[str]
+        self, outcomes: Mapping[str, RobotOutcome], searched: Mapping[Pair, Trigger], jumped: Mapping[str, Reason]
     ) -> tuple[Change, ...]:
         shown_before = {robot: outcome.shown_pair for robot, outcome in self.result.robots.items()}
         centres_m = {robot: known.centre_m for robot, known in self._known.items()}

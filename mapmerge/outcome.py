@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -43,7 +43,7 @@ class Change:
     Parameters
     ----------
     reason
-        What is known of its placement now.
+        What is known of its placement now or, if its map jumped, how.
     trigger
         Why the pair was searched that placed it or, if it is withdrawn, that did so before; None if it was not, as when
         a placement is followed or hangs on that of another robot.
@@ -64,13 +64,13 @@ class Looked:
     searched
         Which pairs were searched, and why.
     jumped
-        Robots whose map jumped.
+        Robots whose map jumped, and how.
     shown_before
         The pair that each robot was judged by before.
     """
 
     searched: Mapping[Pair, Trigger]
-    jumped: Collection[str]
+    jumped: Mapping[str, Reason]
     shown_before: Mapping[str, Pair | None]
 
 
@@ -235,7 +235,7 @@ def changes_of(
     now: dict[str, Sim2] = {}
     for robot, outcome in outcomes.items():
         if robot in looked.jumped:
-            changes.append(Change(robot, ChangeKind.JUMPED, outcome.reason))
+            changes.append(Change(robot, ChangeKind.JUMPED, looked.jumped[robot]))
         pose, before = outcome.merged_from_map, reported.get(robot)
         if outcome.status is Status.REFERENCE:
             continue

@@ -15,6 +15,8 @@ from mapmerge.outcome import Pair
 from mapmerge.prior import Prior
 from mapmerge.watch import Trigger, Watch
 
+_MOVED_SIGMAS = 1.0
+
 Mapped = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 """Applies a function to values and returns the outcomes in their order: `map`, or that of a pool of threads."""
 
@@ -144,7 +146,7 @@ class Pairs:
         watch = self._watches.get(pair)
         if watch is None:
             return Trigger.FIRST
-        if prior is not self._believed[pair]:
+        if self._is_believed_elsewhere(pair, prior):
             return Trigger.PRIOR_CHANGED
         if news.jumps(pair):
             return Trigger.MAP_JUMPED
@@ -154,9 +156,10 @@ class Pairs:
             return Trigger.END
         if not news.updated & set(pair):
             return None
+        areas = areas_m2[pair[0]], areas_m2[pair[1]]
         if self.matches[pair].accepted:
-            return self._doubt(pair, maps, watch, prior)
-        return self._retry(pair, maps, watch, (areas_m2[pair[0]], areas_m2[pair[1]]))
+            return self._doubt(pair, maps, watch, areas, prior)
+        return self._retry(pair, maps, watch, areas)
 
     def _retry(
         self, pair: Pair, maps: Mapping[str, Grid], watch: Watch, areas_m2: tuple[float, float]
@@ -167,7 +170,9 @@ class Pairs:
             return Trigger.RETRY
         if not watch.is_glance_due(areas_m2, config):
             return None
-        if (self.matches[pair].confidence or 0.0) >= self._config.verify.hopeful_confidence:
+        is_near = (self.matches[pair].confidence or 0.0) >= self._config.verify.hopeful_confidence
+        if is_near or self._believed[pair] is not None:
+            # a glance knows no priors
             return Trigger.RETRY
         target, source = self._maps_of(pair, maps)
         if self._matcher.is_hopeful(target, source, self._config):
@@ -175,13 +180,29 @@ class Pairs:
         self._watches[pair] = watch.after_glance(areas_m2, config)
         return None
 
-    def _doubt(self, pair: Pair, maps: Mapping[str, Grid], watch: Watch, prior: Prior | None) -> Trigger | None:
+    def _is_believed_elsewhere(self, pair: Pair, prior: Prior | None) -> bool:
+        """Tell whether what is believed of a pair differs from what was when it was searched, by more than jitter."""
+        before, found = self._believed[pair], self.matches[pair]
+        if prior is None or before is None:
+            return prior is not before
+        if found.accepted and found.target_from_source is not None and prior.allows(found.target_from_source):
+            return not prior.is_about(before, _MOVED_SIGMAS)
+        return not prior.is_about(before)
+
+    def _doubt(
+        self,
+        pair: Pair,
+        maps: Mapping[str, Grid],
+        watch: Watch,
+        areas_m2: tuple[float, float],
+        prior: Prior | None,
+    ) -> Trigger | None:
         """Follow an accepted placement; return why that does not suffice."""
         target, source = self._maps_of(pair, maps)
         found = self._matcher.follow(target, source, self.matches[pair], self._config, prior)
         if found is None:
             return Trigger.CHANGED
-        doubt = watch.doubts(found, self._config.watch)
+        doubt = watch.doubts(found, areas_m2, self._config.watch)
         if doubt is None:
             self.matches[pair] = found
         return doubt

@@ -60,8 +60,8 @@ class Prior:
         slack = np.array([slack_m, slack_m, slack_rad])
         return np.asarray((off <= limits + slack).all(axis=1), np.bool_)
 
-    def is_about(self, other: Prior) -> bool:
-        """Tell whether another belief is this one but for jitter: no part differs by a hundredth of its spread."""
+    def is_about(self, other: Prior, sigmas: float = _UNCHANGED_SIGMAS) -> bool:
+        """Tell whether another belief is this one but for jitter: no part differs by more than that of its spread."""
         one, two = self.target_from_source, other.target_from_source
         differences = (
             (self.sigma_x_m, one.x_m - two.x_m, self.sigma_x_m - other.sigma_x_m),
@@ -69,7 +69,7 @@ class Prior:
             (self.sigma_yaw_rad, wrap_angle(one.yaw_rad - two.yaw_rad), self.sigma_yaw_rad - other.sigma_yaw_rad),
         )
         return self.origin == other.origin and all(
-            max(abs(moved), abs(wider)) <= _UNCHANGED_SIGMAS * sigma for sigma, moved, wider in differences
+            max(abs(moved), abs(wider)) <= sigmas * sigma for sigma, moved, wider in differences
         )
 
     def inverse(self) -> Prior:

@@ -24,7 +24,7 @@ from mapmerge.pairs import News
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
 from mapmerge.warp import Layer
-from mapmerge.watch import Watch
+from mapmerge.watch import Trigger, Watch
 
 Robots = tuple[str, ...]
 Placed = tuple[tuple[str, Sim2], ...]
@@ -48,6 +48,11 @@ class Unions:
     ----------
     matcher, config
         The method and its settings.
+
+    Attributes
+    ----------
+    searched
+        Which of them were searched since the last update, and why.
     """
 
     def __init__(self, matcher: Matcher[Any], config: MergeConfig) -> None:
@@ -55,6 +60,7 @@ class Unions:
         self._known: dict[tuple[Robots, Robots], _Union] = {}
         self._fresh: set[tuple[Robots, Robots]] = set()
         self._is_last = False
+        self.searched: dict[tuple[Robots, Robots], Trigger] = {}
 
     @property
     def matches(self) -> dict[tuple[Robots, Robots], Match]:
@@ -63,10 +69,11 @@ class Unions:
 
     def update(self, maps: Collection[str], news: News) -> None:
         """Take in what changed, before matches are asked for."""
-        self._fresh.clear()
+        asked, self._fresh, self.searched = self._fresh, set(), {}
         for key, union in list(self._known.items()):
             robots = set(sum(key, ()))
-            if not robots <= set(maps) or robots & news.jumped:
+            is_gone = key not in asked or not robots <= set(maps)
+            if is_gone or robots & news.jumped or news.reference in news.jumped:
                 del self._known[key]
             elif robots & news.updated:
                 self._known[key] = replace(union, watch=union.watch.updated())
@@ -77,13 +84,16 @@ class Unions:
         places = _places(key[0], forest), _places(key[1], forest)
         areas_m2 = sum(grids[name].known_area_m2 for name in key[0]), sum(grids[name].known_area_m2 for name in key[1])
         union = self._known.get(key)
-        if union is None or (key not in self._fresh and self._is_due(union, places, areas_m2, grids)):
-            target, source = self._prepared(places, grids)
-            match = self._matcher.match(target, source, self._config)
-            watch = Watch.of(match, areas_m2, union.watch if union else None, self._config.watch)
-            union = self._known[key] = _Union(match, places, watch)
+        trigger = None if key in self._fresh else self._due(union, places, areas_m2, grids)
         self._fresh.add(key)
-        return union.match
+        if union is not None and trigger is None:
+            return union.match
+        target, source = self._prepared(places, grids)
+        match = self._matcher.match(target, source, self._config)
+        watch = Watch.of(match, areas_m2, union.watch if union else None, self._config.watch)
+        self._known[key] = _Union(match, places, watch)
+        self.searched[key] = trigger or Trigger.FIRST
+        return match
 
     def explain(self, key: tuple[Robots, Robots], grids: Mapping[str, Grid]) -> tuple[Evidence, ...]:
         """Return what the matcher saw of two merged maps that it was asked for."""
@@ -96,18 +106,25 @@ class Unions:
         resolution_m = max(self._config.search.working_cell_m, *(grid.resolution_m for grid in merged))
         return [self._matcher.prepare(grid, resolution_m, self._config) for grid in merged]
 
-    def _is_due(
+    def _due(
         self,
-        union: _Union,
+        union: _Union | None,
         places: tuple[Placed, Placed],
         areas_m2: tuple[float, float],
         grids: Mapping[str, Grid],
-    ) -> bool:
+    ) -> Trigger | None:
+        """Return why merged maps are to be searched; a placement that they gave stands until then."""
+        if union is None:
+            return Trigger.FIRST
         if self._is_last and union.watch.searched.updates:
-            return True
+            return Trigger.END
         if any(self._moved(was, now, grids) for was, now in zip(union.places, places, strict=True)):
-            return True
-        return union.watch.is_glance_due(areas_m2, self._config.watch)
+            return Trigger.CHANGED
+        limits = self._config.watch
+        if not union.match.accepted:
+            return Trigger.RETRY if union.watch.is_glance_due(areas_m2, limits) else None
+        grew = union.watch.searched.is_due(areas_m2, limits.glance_growth, limits.longest_search_wait)
+        return Trigger.MAPS_GREW if grew else None
 
     def _moved(self, was: Placed, now: Placed, grids: Mapping[str, Grid]) -> bool:
         """Tell whether a robot's place in its component is another one."""

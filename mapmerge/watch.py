@@ -19,6 +19,8 @@ class Trigger(StrEnum):
     """A map changed, and the method cannot follow a placement."""
     OVERLAP_GREW = "overlap_grew"
     """The maps share much more than when they were searched last."""
+    MAPS_GREW = "maps_grew"
+    """One of the maps knows much more than when they were searched last."""
     WEAKENED = "weakened"
     """The placement does not hold as well as it did."""
     RIVAL_GAINED = "rival_gained"
@@ -42,6 +44,7 @@ _WORDS: Mapping[Trigger, str] = {
     Trigger.FIRST: "both maps are there for the first time",
     Trigger.CHANGED: "a map changed",
     Trigger.OVERLAP_GREW: "the maps share much more than before",
+    Trigger.MAPS_GREW: "one of the maps shows much more than before",
     Trigger.WEAKENED: "the placement did not hold as well any more",
     Trigger.RIVAL_GAINED: "another placement came nearer to it",
     Trigger.MAP_JUMPED: "a map jumped in its own frame",
@@ -124,8 +127,11 @@ class Watch:
         """Tell whether maps without a placement have changed so much that they are searched whatever a glance says."""
         return self.searched.is_due(areas_m2, config.search_growth, config.longest_search_wait)
 
-    def doubts(self, match: Match, config: WatchConfig) -> Trigger | None:
-        """Return why a placement that was followed should be searched anew; None if it holds."""
+    def doubts(self, match: Match, areas_m2: tuple[float, float], config: WatchConfig) -> Trigger | None:
+        """Return why a placement that was followed should be searched anew; None if it holds.
+
+        What the maps show elsewhere may tell that they belong together there, though nothing changes where they are.
+        """
         if not match.accepted or match.scores is None:
             return Trigger.WEAKENED
         if match.scores.wall_agreement < self.agreement - config.agreement_drop:
@@ -134,4 +140,6 @@ class Watch:
             return Trigger.RIVAL_GAINED
         if match.scores.overlap_m2 >= config.overlap_growth * self.overlap_m2:
             return Trigger.OVERLAP_GREW
+        if self.searched.is_due(areas_m2, config.map_growth, config.longest_search_wait):
+            return Trigger.MAPS_GREW
         return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -251,8 +252,8 @@ def _jobs(text: str | None) -> int:
     """Return how many threads are to work at once; those that there are processors for, if nothing is said."""
     if text is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if not text.isascii() or not text.isdigit() or not int(text):
-        raise UsageError(f"--jobs {text}: expected a number of threads, 1 or more")
+    if not re.fullmatch(r"[0-9]{1,3}", text) or not int(text):
+        raise UsageError(f"--jobs {text}: expected a number of threads, 1 to 999")
     return int(text)
 
 

@@ -64,11 +64,9 @@ class ReadAhead(Generic[_Item]):
             for item in self._items:
                 if not self._offer(item):
                     break
+            getattr(self._items, "close", lambda: None)()
         except BaseException as found:  # noqa: BLE001 - it is raised again where the items are wanted
             error = found
-        close = getattr(self._items, "close", None)
-        if close is not None:
-            close()
         self._offer(_Failed(error))
 
     def _offer(self, item: _Item | _Failed) -> bool:

@@ -95,7 +95,7 @@ def _merge(options: argparse.Namespace) -> int:
     from replay.sinks.partial_file import output_errors
     from replay.sinks.terminal import Narrator, ProgressSink, open_console, print_table
 
-    cv2.setNumThreads(run.jobs)
+    cv2.setNumThreads(1)  # the threads are our own, see --jobs
     notes = open_console(stderr=True)
     with open_plan(run) as plan:
         narrator = Narrator(notes, announce=run.robots is None, unused_topics=plan.unused_topics())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
 
@@ -86,11 +87,11 @@ class Match:
 
     @property
     def likeness(self) -> float:
-        """Score of the best rival over that of the placement, 0 to 1; 0 without a rival."""
+        """Score of the best rival over that of the placement; 0 without a rival, more than 1 if it has a larger one."""
         if self.scores is None or self.scores.score_m <= 0.0:
-            return 1.0
+            return math.inf
         best_m = max((rival.score_m for rival in self.rivals), default=0.0)
-        return min(1.0, max(0.0, best_m / self.scores.score_m))
+        return max(0.0, best_m / self.scores.score_m)
 
     def inverse(self) -> Match:
         """Return the match of the same maps, swapped; its evidence must be told afterwards."""

@@ -64,7 +64,7 @@ def about(report: Report) -> str:
 def _decision(change: Change, pose: Sim2 | None) -> Entry:
     why = f" (searched, as {change.trigger.words})" if change.trigger else ""
     if change.kind is ChangeKind.JUMPED:
-        return WARN, f"the map of {change.robot} jumped in its own frame: it contradicts what it was before"
+        return WARN, f"the map of {change.robot} jumped in its own frame: {change.reason.message}"
     if change.kind is ChangeKind.WITHDRAWN or pose is None:
         return WARN, f"{change.robot} is withdrawn: {change.reason.message}{why}"
     at = f"x {pose.x_m:.2f} m, y {pose.y_m:.2f} m, yaw {math.degrees(pose.yaw_rad):.1f}°"

@@ -7,7 +7,7 @@ import pytest
 
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
-from mapmerge.jump import has_jumped
+from mapmerge.jump import jump
 from mapmerge.lattice import changed_box
 from mapmerge.merger import Merger
 from mapmerge.outcome import ChangeKind
@@ -30,7 +30,7 @@ ELSEWHERE = {
 def jumps(before, after):
     """Tell whether a map jumped, as the merger asks."""
     before, after = before.cropped_to_known(), after.cropped_to_known()
-    return has_jumped(before, after, changed_box(before, after), before.known_area_m2, CONFIG)
+    return jump(before, after, changed_box(before, after), before.known_area_m2, CONFIG) is not None
 
 
 def snapshots(**options):
