@@ -485,6 +485,55 @@ class TestState:
         assert all(isinstance(outcome.reason, Reason) for outcome in result.robots.values())
 
 
+POSES = (IDENTITY, Sim2(0.31, -0.2, 0.4), Sim2(-1.0, 0.5, -2.0), Sim2(0.5, 0.25), Sim2(3.0, 1.0))
+
+
+class Changing:
+    """A robot's map that changes in a part, grows, is forgotten and comes back."""
+
+    def __init__(self, value):
+        self.value = value
+        self.cells = np.full((60, 50), value, np.int8)
+        self.first_row = 0
+
+    def changed(self, rng):
+        top, left = rng.integers(0, 40, 2)
+        self.cells = self.cells.copy()
+        self.cells[top : top + 15, left : left + 15] = self.value if rng.random() < 0.5 else -1
+        if rng.random() < 0.2:
+            self.cells = np.pad(self.cells, ((3, 0), (0, 0)), constant_values=self.value)
+            self.first_row -= 3
+        if rng.random() < 0.2:
+            return filled(-1, 2, 2)
+        return Grid(self.cells, 0.05, Sim2(0.0, 0.05 * self.first_row))
+
+
+class TestMerged:
+    @pytest.mark.parametrize("seed", range(12))
+    def test_is_what_is_fused_anew_whatever_happened(self, scripted, seed):
+        """Robots move, and their maps change, that of the reference as well."""
+        rng = np.random.default_rng(seed)
+        session = Session(scripted)
+        maps = {robot: Changing(value) for robot, value in zip(ROBOTS, (ONE, TWO, THREE), strict=False)}
+        for _ in range(30):
+            for pair in ((ONE, TWO), (ONE, THREE), (TWO, THREE)):
+                if rng.random() < 0.1:
+                    scripted.fits(*pair, POSES[rng.integers(len(POSES))], score_m=rng.uniform(40.0, 60.0))
+            chosen = rng.choice(list(maps), rng.integers(1, 4), replace=False).tolist()
+            result = session.step(**{robot: maps[robot].changed(rng) for robot in chosen})
+            placed = {robot: outcome for robot, outcome in result.robots.items() if outcome.merged_from_map is not None}
+            assert (result.merged is None) == (placed == {})
+            if not placed:
+                continue
+            layers = [Layer(result.grids[robot], outcome.merged_from_map) for robot, outcome in placed.items()]
+            anew = fuse(layers, result.grids["r1"], scripted.config.cells)
+            assert result.merged.cells.shape == anew.grid.cells.shape
+            assert np.count_nonzero(result.merged.cells != anew.grid.cells) <= anew.grid.cells.size / 1000
+            overlaps_m2 = [outcome.agreement.overlap_m2 for outcome in placed.values()]
+            expected_m2 = [agreement.overlap_m2 for agreement in anew.agreements]
+            assert overlaps_m2 == pytest.approx(expected_m2, rel=0.01, abs=0.05)
+
+
 ORDERS = {
     "in turns": ["r1", "r2", "r1", "r2", "r1", "r2"],
     "r1 first": ["r1", "r1", "r1", "r2", "r2", "r2"],
