@@ -9,13 +9,13 @@ The canvas is worked on in tiles: only those under a change are fused again.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from mapmerge.config import CellConfig
-from mapmerge.grid import Grid
+from mapmerge.grid import UNKNOWN, Cells, Grid
 from mapmerge.lattice import changed_box, offset_cells
 from mapmerge.odds import Counts, Fused, LogOdds
 from mapmerge.plane import NOTHING, Box, Plane
@@ -87,7 +87,8 @@ class Canvas:
         self._counts: dict[str, Counts] = {}
         self._known = 0
         self._tiles: dict[Box, Fused] = {}
-        self._cells = Plane(np.uint8)  # values of cells and 1, so that 0 is unknown
+        self._cells = Plane(np.int8, UNKNOWN)
+        self._is_published = False
         self._grid: Grid | None = None
 
     def update(self, layers: Mapping[str, Layer], lattice: Grid, changed: Mapping[str, Box] | None = None) -> Fusion:
@@ -106,26 +107,33 @@ class Canvas:
         if self._lattice is None or offset_cells(self._lattice, lattice) is None:
             self._lattice, self._grid = lattice, None
             self._warps, self._counts, self._known, self._tiles = {}, {}, 0, {}
-            self._cells = Plane(np.uint8)
+            self._cells, self._is_published = Plane(np.int8, UNKNOWN), False
         warps = {name: self._warp(name, layer, self._lattice) for name, layer in layers.items()}
         dirty = {
             tile
             for name in {**self._warps, **warps}
             for tile in self._dirty(self._warps.get(name), warps.get(name), (changed or {}).get(name))
         }
-        covered = NOTHING
-        for warp in warps.values():
-            covered = covered.union(warp.box)
-        is_same = self._grid is not None and covered == self._cells.box
         self._warps = warps
         self._counts = {name: self._counts.get(name, Counts()) for name in warps}
-        self._cells.cover(covered)
+        is_same = not self._cover(warps.values()) and self._grid is not None
         for tile in sorted(dirty):
             is_same &= not self._renew(tile)
         if self._grid is None or not is_same:
             self._grid = self._published(self._lattice)
         cell_m2 = lattice.resolution_m**2
         return Fusion(self._grid, tuple(_agreement(count, self._known, cell_m2) for count in self._counts.values()))
+
+    def _cover(self, warps: Iterable[Warp]) -> bool:
+        """Cover just what some layers reach; tell whether that changed."""
+        covered = NOTHING
+        for warp in warps:
+            covered = covered.union(warp.box)
+        if covered == self._cells.box:
+            return False
+        self._cells.cover(covered)
+        self._is_published = False
+        return True
 
     def _warp(self, name: str, layer: Layer, lattice: Grid) -> Warp:
         known = self._warps.get(name)
@@ -153,16 +161,22 @@ class Canvas:
         on_tile = {name: warp.tile(tile) for name, warp in self._warps.items()}
         present = {name: cells for name, cells in on_tile.items() if cells is not None}
         inside = tile.within(self._cells.box)
-        shown = self._cells.part(inside)
         if present:
             cells, self._tiles[tile] = self._odds.fuse(present)
             self._count(self._tiles[tile], 1)
-            new = cells[inside.slices(tile)].view(np.uint8) + np.uint8(1)
+            new = cells[inside.slices(tile)]
         else:
-            new = np.zeros(inside.shape, np.uint8)
-        is_changed = not np.array_equal(shown, new)
-        shown[:] = new
-        return is_changed
+            new = np.full(inside.shape, UNKNOWN, np.int8)
+        if np.array_equal(self._cells.part(inside), new):
+            return False
+        self._write(inside, new)
+        return True
+
+    def _write(self, box: Box, cells: Cells) -> None:
+        """Write cells of the merged map: to a copy, if they are those of a grid that was given away."""
+        if self._is_published:
+            self._cells.cells, self._is_published = self._cells.cells.copy(), False
+        self._cells.part(box)[:] = cells
 
     def _count(self, fused: Fused | None, sign: int) -> None:
         if fused is None:
@@ -174,8 +188,8 @@ class Canvas:
     def _published(self, lattice: Grid) -> Grid:
         box = self._cells.box
         corner = Sim2(box.left * lattice.resolution_m, box.top * lattice.resolution_m)
-        cells = (self._cells.cells - np.uint8(1)).view(np.int8)
-        return Grid(cells, lattice.resolution_m, lattice.map_from_grid @ corner)
+        self._is_published = True
+        return Grid(self._cells.cells, lattice.resolution_m, lattice.map_from_grid @ corner)
 
 
 def _tiles(box: Box) -> Iterator[Box]:

@@ -13,7 +13,7 @@ from mapmerge.sim2 import IDENTITY, Points, Sim2
 
 Cells = NDArray[np.int8]
 Mask = NDArray[np.bool_]
-Indices = NDArray[np.intp] | NDArray[np.int64]
+Indices = NDArray[np.intp] | NDArray[np.int64] | NDArray[np.int32]
 
 UNKNOWN = -1
 UNKNOWN_BYTE = 255

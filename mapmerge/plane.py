@@ -72,12 +72,14 @@ NOTHING = Box(0, 0, 0, 0)
 
 
 class Plane:
-    """An array over a box of a lattice; zero where nothing was written yet.
+    """An array over a box of a lattice.
 
     Parameters
     ----------
     dtype
         Of its values.
+    blank
+        Its value where nothing was written yet.
 
     Attributes
     ----------
@@ -87,15 +89,16 @@ class Plane:
         Its values, shape ``box.shape``, contiguous; written in place.
     """
 
-    def __init__(self, dtype: Any) -> None:  # noqa: ANN401 - whatever numpy takes
+    def __init__(self, dtype: Any, blank: int = 0) -> None:  # noqa: ANN401 - whatever numpy takes
         self.box = NOTHING
+        self._blank = blank
         self.cells: NDArray[Any] = np.zeros((0, 0), dtype)
 
     def cover(self, box: Box) -> None:
         """Cover exactly this box; values inside of it are kept, those outside of it are forgotten."""
         if box == self.box:
             return
-        cells = np.zeros(box.shape, self.cells.dtype)
+        cells = self._blanks(box)
         kept = box.within(self.box)
         cells[kept.slices(box)] = self.cells[kept.slices(self.box)]
         self.box, self.cells = box, cells
@@ -105,10 +108,15 @@ class Plane:
         return self.cells[box.slices(self.box)]
 
     def read(self, box: Box) -> NDArray[Any]:
-        """Return the values of any box, zero where it is not covered: a view if all of it is, else a copy."""
+        """Return the values of any box, blank where it is not covered: a view if all of it is, else a copy."""
         inside = box.within(self.box)
         if inside == box:
             return self.part(box)
-        values = np.zeros(box.shape, self.cells.dtype)
+        values = self._blanks(box)
         values[inside.slices(box)] = self.cells[inside.slices(self.box)]
         return values
+
+    def _blanks(self, box: Box) -> NDArray[Any]:
+        if self._blank:
+            return np.full(box.shape, self._blank, self.cells.dtype)
+        return np.zeros(box.shape, self.cells.dtype)

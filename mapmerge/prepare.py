@@ -35,7 +35,7 @@ FREE_SPACING_M = 0.25
 _MARGIN_M = 1.0
 _MARGIN_SLACK_M = 0.1
 _FAR_M = 1e6
-_BAND_CELLS = 1024
+_BAND_CELLS = 512
 _ROUNDING = 1e-9
 
 
@@ -103,7 +103,7 @@ class LiveMap:
         self._first = (0, 0)
         self._classes, self._meets = Plane(np.uint8), Plane(np.uint8)
         self._walls = LiveWalls(self._spacing_m / self._resolution_m, self._reach_squares)
-        self._free_rows, self._free_cols = np.empty(0, np.int64), np.empty(0, np.int64)
+        self._free_rows, self._free_cols = np.empty(0, np.int32), np.empty(0, np.int32)
         self._known = 0
 
     def _take(self, known: Grid, changed: Box) -> None:
@@ -115,11 +115,11 @@ class LiveMap:
         for plane in (self._classes, self._meets):
             plane.cover(padded)
         self._classes.part(changed.within(padded))[:] = CELL_UNKNOWN
-        inside = changed.within(covered)
-        cells = np.ascontiguousarray(known.cells[inside.slices(covered)])
-        classes = self._classes_of[cells.view(np.uint8)]
-        self._classes.part(inside)[:] = classes
-        self._known += int(np.count_nonzero(classes))
+        for band in changed.within(covered).bands(_BAND_CELLS):
+            cells = np.ascontiguousarray(known.cells[band.slices(covered)])
+            classes = self._classes_of[cells.view(np.uint8)]
+            self._classes.part(band)[:] = classes
+            self._known += int(np.count_nonzero(classes))
         for band in changed.padded(self._reach_of_meets).within(padded).bands(_BAND_CELLS):
             self._meet(band)
         self._sample_free(covered, changed)
@@ -159,7 +159,9 @@ class LiveMap:
         row, col = np.nonzero(self._classes.part(rows)[down::step, across::step] == CELL_FREE)
         begin, end = np.searchsorted(self._free_rows, (changed.top, changed.bottom))
         parts = (self._free_rows, row * step + rows.top + down), (self._free_cols, col * step + rows.left + across)
-        self._free_rows, self._free_cols = (np.concatenate([old[:begin], new, old[end:]]) for old, new in parts)
+        self._free_rows, self._free_cols = (
+            np.concatenate([old[:begin], new.astype(np.int32), old[end:]]) for old, new in parts
+        )
 
     def _published(self, known: Grid) -> PreparedMap:
         walls, cell_m = self._walls, self._resolution_m
@@ -185,10 +187,14 @@ class LiveMap:
             classes=self._classes.cells,
             meets=self._meets.cells,
             nearest=nearest,
-            wall_cells=(walls.cell_rows - row, walls.cell_cols - col),
+            # the arrays themselves if possible, as they are never written to
+            wall_cells=(
+                walls.cell_rows - np.int32(row) if row else walls.cell_rows,
+                walls.cell_cols - np.int32(col) if col else walls.cell_cols,
+            ),
             walls_m=np.stack([x_m[walls.numbers], y_m[walls.numbers]], axis=1),
             numbers=walls.numbers,
-            free_m=cell_centres_m(self._free_rows - row, self._free_cols - col, cell_m),
+            free_m=cell_centres_m(self._free_rows - np.int32(row), self._free_cols - np.int32(col), cell_m),
             wall_spacing_m=self._spacing_m,
             free_spacing_m=self._free_step * cell_m,
             margin=self._margin,

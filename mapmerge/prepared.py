@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mapmerge.grid import Grid, cell_centres_m
 from mapmerge.sim2 import Points
 
-Whole = NDArray[np.int64]
+Cells32 = NDArray[np.int32]
 
 CELL_UNKNOWN, CELL_FREE, CELL_OCCUPIED, CELL_UNSURE = 0, 1, 2, 3
 MEETS_FREE, MEETS_WALL, MEETS_NEAR = 1, 2, 4
@@ -100,7 +100,7 @@ class PreparedMap:
     classes: NDArray[np.uint8]
     meets: NDArray[np.uint8]
     nearest: NearestWalls
-    wall_cells: tuple[Whole, Whole]
+    wall_cells: tuple[Cells32, Cells32]
     walls_m: Points
     numbers: NDArray[np.int32]
     free_m: Points

@@ -21,6 +21,9 @@ from mapmerge.sim2 import Points
 Whole = NDArray[np.int64]
 Numbers = NDArray[np.int32]
 
+Cells32 = NDArray[np.int32]
+"""Rows or columns of cells: a map has too many walls for more bytes than they need."""
+
 _Item = TypeVar("_Item", bound=np.generic)
 
 NO_WALL = 0
@@ -91,8 +94,8 @@ class LiveWalls:
     def __init__(self, square_cells: float, reach_squares: float) -> None:
         self.squares = Squares(square_cells)
         self.reach_squares = reach_squares
-        self.cell_rows: Whole = np.empty(0, np.int64)
-        self.cell_cols: Whole = np.empty(0, np.int64)
+        self.cell_rows: Cells32 = np.empty(0, np.int32)
+        self.cell_cols: Cells32 = np.empty(0, np.int32)
         self.numbers: Numbers = np.empty(0, np.int32)
         self.rows: NDArray[np.float64] = np.zeros(1)
         self.cols: NDArray[np.float64] = np.zeros(1)
@@ -137,8 +140,8 @@ class LiveWalls:
         row, col = np.divmod(cells, max(1, rows.shape[1]))
         row, col = row + rows.top, col + rows.left
         begin, end = np.searchsorted(self.cell_rows, (first, last))
-        self.cell_rows = _spliced(self.cell_rows, begin, end, row)
-        self.cell_cols = _spliced(self.cell_cols, begin, end, col)
+        self.cell_rows = _spliced(self.cell_rows, begin, end, row.astype(np.int32))
+        self.cell_cols = _spliced(self.cell_cols, begin, end, col.astype(np.int32))
 
         keys, mean_row, mean_col = self._thinned(row, col)
         begin, end = np.searchsorted(self._keys, (band.top * _ROW - _ROW // 2, band.bottom * _ROW - _ROW // 2))

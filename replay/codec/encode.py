@@ -30,7 +30,7 @@ class FrameTransform:
     parent_from_child: Sim2
 
 
-def encode_grid(grid: Grid, frame_id: str, stamp_ns: int) -> bytes:
+def encode_grid(grid: Grid, frame_id: str, stamp_ns: int) -> memoryview:
     """Return a map as a ``nav_msgs/OccupancyGrid``; its ``map_load_time`` is left at 0.
 
     Raises
@@ -59,7 +59,7 @@ def encode_grid(grid: Grid, frame_id: str, stamp_ns: int) -> bytes:
     return _encoded(message, GRID_TYPE)
 
 
-def encode_transforms(transforms: Sequence[FrameTransform], stamp_ns: int) -> bytes:
+def encode_transforms(transforms: Sequence[FrameTransform], stamp_ns: int) -> memoryview:
     """Return transforms as a ``tf2_msgs/TFMessage``; raises as `encode_grid` does."""
     stamped = [
         _new(
@@ -79,7 +79,7 @@ def encode_transforms(transforms: Sequence[FrameTransform], stamp_ns: int) -> by
     return _encoded(_new(TF_TYPE, transforms=stamped), TF_TYPE)
 
 
-def encode_image(rgb: Rgb, frame_id: str, stamp_ns: int) -> bytes:
+def encode_image(rgb: Rgb, frame_id: str, stamp_ns: int) -> memoryview:
     """Return a picture as a ``sensor_msgs/Image`` with encoding ``rgb8``; raises as `encode_grid` does."""
     rows, cols = rgb.shape[:2]
     message = _new(
@@ -114,5 +114,5 @@ def _turn(yaw_rad: float) -> Any:  # noqa: ANN401 - as above
     return _new("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=math.sin(yaw_rad / 2), w=math.cos(yaw_rad / 2))
 
 
-def _encoded(message: Any, msgtype: str) -> bytes:  # noqa: ANN401 - as above
-    return bytes(ros2_typestore().serialize_cdr(message, msgtype, little_endian=True))
+def _encoded(message: Any, msgtype: str) -> memoryview:  # noqa: ANN401 - as above
+    return ros2_typestore().serialize_cdr(message, msgtype, little_endian=True)

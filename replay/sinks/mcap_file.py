@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from mcap.exceptions import McapError
@@ -59,6 +59,7 @@ class McapSink:
         self._last_map_ns: int | None = None
         self._pending_map: tuple[int, Grid] | None = None
         self._pending_report: tuple[int, Report] | None = None
+        self._said: Mapping[str, Any] | None = None
         with output_errors(path):
             self._stream = self._file.partial.open("wb")
         self._channels = _Channels(Writer(self._stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD))
@@ -144,18 +145,24 @@ class McapSink:
         data = encode_image(item.picture.rgb, MERGED_FRAME, stamp_ns)
         self._channels.ros2(topic, IMAGE_TYPE, stamp_ns, data)
 
-    def _flush_report(self) -> None:
-        """Write the report of the tick before: it is held back, for the last one is only known at the end."""
-        if self._pending_report is not None:
-            stamp_ns, report = self._pending_report
+    def _flush_report(self, *, is_last: bool = False) -> None:
+        """Write the report of the tick before, unless it says nothing new.
+
+        It is held back, for the last one is only known at the end.
+        """
+        if self._pending_report is None:
+            return
+        (stamp_ns, report), self._pending_report = self._pending_report, None
+        said = {**report, "stamp_ns": None}
+        if is_last or said != self._said:
             self._channels.report(stamp_ns, report)
-            self._pending_report = None
+        self._said = said
 
     def _end(self, report: Report) -> None:
         stamp_ns = self._pending_report[0] if self._pending_report else 0
         self._flush_map(stamp_ns)
         self._pending_report = (stamp_ns, report)
-        self._flush_report()
+        self._flush_report(is_last=True)
         self._channels.metadata("replay.inputs", {"inputs": _compact(report["inputs"])})
 
 
@@ -177,7 +184,7 @@ class _Channels:
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         self._writer.add_metadata(name, dict(values))
 
-    def ros2(self, topic: str, msgtype: str, stamp_ns: int, data: bytes, *, latched: bool = False) -> None:
+    def ros2(self, topic: str, msgtype: str, stamp_ns: int, data: memoryview, *, latched: bool = False) -> None:
         if topic not in self._channels:
             if msgtype not in self._schemas:
                 definition = ros2_message_definition(msgtype).encode()
@@ -199,10 +206,11 @@ class _Channels:
             self._channels[REPORT_TOPIC] = self._writer.register_channel(REPORT_TOPIC, "json", _NO_SCHEMA)
         self._message(REPORT_TOPIC, stamp_ns, _compact(report).encode())
 
-    def _message(self, topic: str, stamp_ns: int, data: bytes) -> None:
+    def _message(self, topic: str, stamp_ns: int, data: bytes | memoryview) -> None:
         sequence = self._sequences.get(topic, 0)
         self._sequences[topic] = sequence + 1
-        self._writer.add_message(self._channels[topic], stamp_ns, data, stamp_ns, sequence)
+        # the library takes whatever can be written to a stream
+        self._writer.add_message(self._channels[topic], stamp_ns, cast("bytes", data), stamp_ns, sequence)
 
 
 def topic_parts(robots: Sequence[str]) -> dict[str, str]:

@@ -24,6 +24,13 @@ class ChunkCache:
         self._load = load
         self._chunks: OrderedDict[int, bytes] = OrderedDict()
 
+    def __len__(self) -> int:
+        return len(self._chunks)
+
+    def forget(self, offset: int) -> None:
+        """Let go of a chunk that is not needed any more; of one that is not held, nothing."""
+        self._chunks.pop(offset, None)
+
     def __getitem__(self, offset: int) -> bytes:
         chunk = self._chunks.get(offset)
         if chunk is None:

@@ -81,7 +81,7 @@ class SavedMap(Closing):
             known = self._description
             cells = cells_from_pixels(_pixels(self.path, known.image), known.mode, known.thresholds)
             grid = Grid(cells, known.resolution_m, known.map_from_grid)
-            data = encode_grid(grid, FRAME_ID, stamp_ns=0)
+            data = bytes(encode_grid(grid, FRAME_ID, stamp_ns=0))
         yield RawMessage(TOPIC, GRID_TYPE, "cdr", 0, data)
 
     def close(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
@@ -75,10 +76,15 @@ class McapFile(Closing):
             wanted = {key: each for key, each in self._contents.channels.items() if each.topic in topics}
             self._check_encodings(wanted)
             chunks = ChunkCache(self._file.chunk)
-            for entry in self._entries(wanted):
+            entries = self._entries(wanted)
+            left = Counter(entry.block for entry in entries)
+            for entry in entries:
                 channel = wanted[entry.channel]
                 encoding = ENCODINGS[channel.encoding]
                 data = self._data(entry, chunks)
+                left[entry.block] -= 1
+                if not left[entry.block]:
+                    chunks.forget(entry.block)
                 if encoding == "cdr":
                     data = decompressed_cdr(data)
                 yield RawMessage(channel.topic, channel.msgtype, encoding, entry.log_time_ns, data)

@@ -8,7 +8,7 @@ import pytest
 
 from mapmerge import fuse as fuse_module
 from mapmerge.config import CellConfig
-from mapmerge.fuse import fuse
+from mapmerge.fuse import Canvas, fuse
 from mapmerge.grid import Grid
 from mapmerge.sim2 import IDENTITY, Sim2
 from mapmerge.warp import Layer
@@ -306,6 +306,20 @@ class TestAgreement:
     def test_acceptance_from_65_on(self):
         assert fused(grid_of([65]), grid_of([100])).agreements[0].acceptance == 1.0
         assert fused(grid_of([64]), grid_of([100])).agreements[0].acceptance == 0.0
+
+
+class TestCanvas:
+    def test_a_grid_that_was_given_away_stays_as_it_is(self):
+        canvas, before = Canvas(CELLS), blob(1)
+        after = before.copy()
+        after[3:6, 4:9] = 100 - np.maximum(before[3:6, 4:9], 0)
+        given = canvas.update({"a": Layer(grid_of(before), IDENTITY)}, grid_of(before)).grid
+        copied = given.cells.copy()
+        again = canvas.update({"a": Layer(grid_of(before.copy()), IDENTITY)}, grid_of(before)).grid
+        assert again is given
+        changed = canvas.update({"a": Layer(grid_of(after), IDENTITY)}, grid_of(before)).grid
+        assert np.array_equal(given.cells, copied)
+        assert changed.same_as(fused(grid_of(after)).grid)
 
 
 class TestTiles:

@@ -26,6 +26,12 @@ class TestCells:
         assert cell_agreement(target, source, IDENTITY) == (2, 2, 5)
         assert figures(target, source).acceptance == 0.5
 
+    def test_the_bands_cannot_be_told_from_the_outcome(self, monkeypatch):
+        target, source, pose = prepared_map(flat()), prepared_map(flat(ragged=1)), Sim2(0.71, -0.33, 0.4)
+        whole = cell_agreement(target, source, pose)
+        monkeypatch.setattr("mapmerge.verify._BAND_CELLS", 1)
+        assert cell_agreement(target, source, pose) == whole
+
     def test_of_a_shifted_map_by_search(self):
         target, source, pose = prepared_map(flat()), prepared_map(flat(ragged=1)), Sim2(0.71, -0.33, 0.4)
         agree = disagree = both = 0

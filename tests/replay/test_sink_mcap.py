@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -222,6 +223,24 @@ class TestReports:
         validator.validate(json.loads(report_text(finished.report)))
         assert found[-1][1] == json.loads(report_text(finished.report))
         assert [time_ns for time_ns, _ in found] == ([event.stamp_ns for event in ticks(scenario)] or [0])
+
+    def test_one_that_says_nothing_new_is_not_written(self, tmp_path: Path) -> None:
+        path = tmp_path / "run.mcap"
+        *before, last, finished = events_of("merged")
+        assert isinstance(last, Merged)
+        later = [
+            replace(last, stamp_ns=last.stamp_ns + more, report={**last.report, "stamp_ns": last.stamp_ns + more})
+            for more in (1, 2)
+        ]
+        assert isinstance(finished, Finished)
+        ended = Finished({**finished.report, "stamp_ns": last.stamp_ns + 2})
+        sink = McapSink(path, OutputOptions(path))
+        drain([*before, last, *later, ended], [sink])
+        sink.finish()
+        sink.publish()
+        stamps = [event.stamp_ns for event in ticks()]
+        assert [time_ns for time_ns, _ in reports(path)] == [*stamps, stamps[-1] + 2]
+        assert [time_ns for time_ns, _ in raw(path, "/tf")][-2:] == [stamps[-1] + 1, stamps[-1] + 2]
 
     def test_are_as_of_their_stamp(self, whole: Path) -> None:
         for (_, report), event in zip(reports(whole)[:-1], ticks(), strict=False):

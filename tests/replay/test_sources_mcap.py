@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 import struct
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -251,6 +252,20 @@ def test_only_a_few_chunks_are_held() -> None:
     assert loads == list(range(HELD_CHUNKS))
     cache[99], cache[1], cache[0]
     assert loads == [*range(HELD_CHUNKS), 99, 0]
+
+
+def test_a_chunk_is_let_go_of_once_all_its_messages_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    caches: list[ChunkCache] = []
+
+    class Watched(ChunkCache):
+        def __init__(self, load: Callable[[int], bytes]) -> None:
+            super().__init__(load)
+            caches.append(self)
+
+    monkeypatch.setattr("replay.sources.mcap_file.ChunkCache", Watched)
+    with open_source(bags.write_mcap(tmp_path / "a.mcap", chunk_bytes=1)) as source:
+        for _ in source.messages(["/r1/map"]):
+            assert len(caches[-1]) == 0
 
 
 def test_message_data_do_not_keep_their_chunk(tmp_path: Path) -> None:
