@@ -104,7 +104,8 @@ class Watch:
         if match.accepted and match.scores is not None:
             scores = match.scores
             return Watch(now, now, 1, scores.overlap_m2, scores.wall_agreement, match.likeness)
-        return Watch(now, now, 1 if before is None else before.next_wait(config))
+        was_placed = before is not None and before.overlap_m2 > 0.0
+        return Watch(now, now, 1 if before is None or was_placed else before.next_wait(config))
 
     def next_wait(self, config: WatchConfig) -> int:
         """Return how long to wait after nothing was found once more: twice as long."""

@@ -111,12 +111,13 @@ class TestFirst:
 
 
 class TestPlaced:
-    def test_a_placement_that_holds_is_followed_and_never_searched(self, placed):
-        for _ in range(100):
+    def test_a_placement_that_holds_is_followed_and_searched_after_long_only(self, placed):
+        """Of what the maps show elsewhere, nothing tells where they were placed."""
+        for _ in range(placed.matcher.config.watch.longest_search_wait - 1):
             assert placed.step("r2") == {}
             assert placed.asked() == (1, 0, 1, 0)
-        assert placed.step("r1", "r2") == {}
-        assert placed.asked() == (2, 0, 1, 0)
+        assert placed.step("r1", "r2") == {ONE_TWO: Trigger.MAPS_GREW}
+        assert placed.asked() == (2, 1, 1, 0)
 
     def test_what_is_followed_is_the_outcome(self, placed, scripted):
         moved = Sim2(1.3, 2.0, 0.3)
