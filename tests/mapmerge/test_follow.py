@@ -278,7 +278,7 @@ class TestRevoked:
         merger = merged_one_bay_off("hall")
         changes = grown(merger, "hall")
         assert changes[0].kind in {ChangeKind.MOVED, ChangeKind.WITHDRAWN}
-        assert changes[0].trigger in {Trigger.WEAKENED, Trigger.OVERLAP_GREW, Trigger.RIVAL_GAINED}
+        assert changes[0].trigger in {Trigger.WEAKENED, Trigger.OVERLAP_GREW, Trigger.MAPS_GREW, Trigger.RIVAL_GAINED}
         outcome = merger.result.robots["r2"]
         assert outcome.status is Status.MERGED
         true = FRAMES["r1"].inverse() @ FRAMES["r2"]

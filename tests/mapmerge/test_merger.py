@@ -279,7 +279,6 @@ class TestWithdrawing:
         scripted.fits(ONE, TWO, Sim2(1.0))
         session.step(r1=ONE, r2=TWO)
         session.step(r2=THREE)
-        session.step(r2=FOUR)
         assert changes(session.step(r2=TWO)) == [("r2", ChangeKind.PLACED)]
 
     def test_when_the_reference_starts_anew_all_go(self, session, scripted):
