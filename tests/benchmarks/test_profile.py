@@ -48,7 +48,7 @@ def test_a_replay_is_sampled(tmp_path, capsys):
             pytest.skip(f"processes may not be sampled here: {error}")
         raise
     parts = {line.rpartition(" ")[0].strip() for line in capsys.readouterr().out.splitlines()}
-    assert {"matching", "fusing"} <= parts
+    assert "matching" in parts
     assert any("mapmerge/merger.py" in frame.name for frame in frames(flame_graph))
 
 
