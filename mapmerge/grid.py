@@ -13,6 +13,8 @@ from mapmerge.sim2 import IDENTITY, Points, Sim2
 
 Cells = NDArray[np.int8]
 Mask = NDArray[np.bool_]
+Counted = NDArray[np.int32]
+"""Rows or columns of many cells, in no more bytes than they need."""
 Indices = NDArray[np.intp] | NDArray[np.int64] | NDArray[np.int32]
 
 UNKNOWN = -1

@@ -25,7 +25,8 @@ from mapmerge.plane import Box
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
-from mapmerge.unite import Robots, Unions, united
+from mapmerge.unions import Robots, Unions
+from mapmerge.unite import united
 from mapmerge.warp import Layer
 from mapmerge.watch import Trigger
 
@@ -137,9 +138,9 @@ class Merger:
         grids = {robot: latest[robot] for robot in robots if robot in latest}
         believed = _pair_priors(robots[0], list(combinations(self._maps, 2)), priors or {}, self.result.priors)
         news = News(frozenset(updated), frozenset(jumped), robots[0], is_last)
-        searched = self._search(believed, news)
+        alone = self._match_pairs(believed, news)
         matches, forest = self._linked(believed)
-        searched = self._searched(searched)
+        searched = self._searched(alone)
         pairs = _without_contradicted(matches, forest)
         layers = _layers(robots[0], self._maps, forest)
         fusion = self._fused(layers, grids.get(robots[0]), changed)
@@ -185,16 +186,16 @@ class Merger:
         self._maps = {robot: self._maps[robot] for robot in self.result.robots if robot in self._maps}
         return jumped, changed
 
-    def _search(self, believed: Mapping[Pair, Prior], news: News) -> dict[Pair, Trigger]:
+    def _match_pairs(self, believed: Mapping[Pair, Prior], news: News) -> dict[Pair, Trigger]:
         """Bring the matches of pairs up to date; return which were searched, and why."""
         areas_m2 = {robot: known.area_m2 for robot, known in self._known.items()}
         self._unions.update(self._maps, news)
         return self._pairs.update(self._maps, areas_m2, believed, news)
 
-    def _searched(self, searched: Mapping[Pair, Trigger]) -> dict[Pair, Trigger]:
+    def _searched(self, alone: Mapping[Pair, Trigger]) -> dict[Pair, Trigger]:
         """Return why pairs were searched; of those whose match is that of merged maps, why these were."""
         of_unions = {pair: self._unions.searched.get(key) for pair, key in self._of_merged_maps.items()}
-        both = {**searched, **of_unions}
+        both = {**alone, **of_unions}
         return {pair: trigger for pair, trigger in both.items() if trigger is not None}
 
     def _linked(self, believed: Mapping[Pair, Prior]) -> tuple[dict[Pair, Match], Forest]:

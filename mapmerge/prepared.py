@@ -10,10 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.grid import Grid, cell_centres_m
+from mapmerge.grid import Counted, Grid, cell_centres_m
 from mapmerge.sim2 import Points
-
-Cells32 = NDArray[np.int32]
 
 CELL_UNKNOWN, CELL_FREE, CELL_OCCUPIED, CELL_UNSURE = 0, 1, 2, 3
 MEETS_FREE, MEETS_WALL, MEETS_NEAR = 1, 2, 4
@@ -100,7 +98,7 @@ class PreparedMap:
     classes: NDArray[np.uint8]
     meets: NDArray[np.uint8]
     nearest: NearestWalls
-    wall_cells: tuple[Cells32, Cells32]
+    wall_cells: tuple[Counted, Counted]
     walls_m: Points
     numbers: NDArray[np.int32]
     free_m: Points

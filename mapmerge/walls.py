@@ -14,15 +14,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.grid import Mask
+from mapmerge.grid import Counted, Mask
 from mapmerge.plane import NOTHING, Box, Plane
 from mapmerge.sim2 import Points
 
 Whole = NDArray[np.int64]
 Numbers = NDArray[np.int32]
-
-Cells32 = NDArray[np.int32]
-"""Rows or columns of cells: a map has too many walls for more bytes than they need."""
 
 _Item = TypeVar("_Item", bound=np.generic)
 
@@ -94,8 +91,8 @@ class LiveWalls:
     def __init__(self, square_cells: float, reach_squares: float) -> None:
         self.squares = Squares(square_cells)
         self.reach_squares = reach_squares
-        self.cell_rows: Cells32 = np.empty(0, np.int32)
-        self.cell_cols: Cells32 = np.empty(0, np.int32)
+        self.cell_rows: Counted = np.empty(0, np.int32)
+        self.cell_cols: Counted = np.empty(0, np.int32)
         self.numbers: Numbers = np.empty(0, np.int32)
         self.rows: NDArray[np.float64] = np.zeros(1)
         self.cols: NDArray[np.float64] = np.zeros(1)

@@ -16,7 +16,7 @@ class Trigger(StrEnum):
     FIRST = "first"
     """Both maps are there for the first time."""
     CHANGED = "changed"
-    """A map changed, and the method cannot follow a placement."""
+    """A map changed, or moved within merged maps, and the placement cannot be followed."""
     OVERLAP_GREW = "overlap_grew"
     """The maps share much more than when they were searched last."""
     MAPS_GREW = "maps_grew"
@@ -55,8 +55,8 @@ _WORDS: Mapping[Trigger, str] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
-    """When two sets of maps were looked at.
+class Since:
+    """What two sets of maps knew when they were looked at, and how often they changed since.
 
     Parameters
     ----------
@@ -90,8 +90,8 @@ class Watch:
         the best rival over its own; 0 without a placement, or a rival.
     """
 
-    searched: Look
-    glanced: Look
+    searched: Since
+    glanced: Since
     wait: int = 1
     overlap_m2: float = 0.0
     agreement: float = 0.0
@@ -100,7 +100,7 @@ class Watch:
     @staticmethod
     def of(match: Match, areas_m2: tuple[float, float], before: Watch | None, config: WatchConfig) -> Watch:
         """Return the watch over maps that were just searched, given the watch over them before that, if it goes on."""
-        now = Look(areas_m2)
+        now = Since(areas_m2)
         if match.accepted and match.scores is not None:
             scores = match.scores
             return Watch(now, now, 1, scores.overlap_m2, scores.wall_agreement, match.likeness)
@@ -113,12 +113,12 @@ class Watch:
 
     def updated(self) -> Watch:
         """Return the watch after an update of the maps."""
-        searched, glanced = (replace(look, updates=look.updates + 1) for look in (self.searched, self.glanced))
+        searched, glanced = (replace(since, updates=since.updates + 1) for since in (self.searched, self.glanced))
         return replace(self, searched=searched, glanced=glanced)
 
     def after_glance(self, areas_m2: tuple[float, float], config: WatchConfig) -> Watch:
         """Return the watch after a glance that had no hope."""
-        return replace(self, glanced=Look(areas_m2), wait=self.next_wait(config))
+        return replace(self, glanced=Since(areas_m2), wait=self.next_wait(config))
 
     def is_glance_due(self, areas_m2: tuple[float, float], config: WatchConfig) -> bool:
         """Tell whether maps without a placement have changed enough to be glanced at."""

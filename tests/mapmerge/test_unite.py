@@ -14,7 +14,8 @@ from mapmerge.pairs import News
 from mapmerge.prior import Prior
 from mapmerge.reasons import ReasonCode
 from mapmerge.sim2 import IDENTITY, Sim2
-from mapmerge.unite import Unions, united
+from mapmerge.unions import Unions
+from mapmerge.unite import united
 from tests.floors import CONFIG, FLAT_WALLS, drawn, errors, hall_and_part, within
 
 ROBOTS = ("r1", "r2", "r3", "r4")
