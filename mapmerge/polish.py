@@ -6,6 +6,7 @@ about a cell, which is smooth and treats the two maps alike.
 
 from __future__ import annotations
 
+import cmath
 import math
 
 import numpy as np
@@ -21,10 +22,14 @@ Floats = NDArray[np.float32]
 _CONVERGED_M = 2e-4
 _CONVERGED_RAD = 2e-5
 _MIN_PAIRS = 12
+_SLACK_CELLS, _SLACK_SQUARES = 3.0, 2.0
 
 
 def polish(target: PreparedMap, wall_cells_m: Points, start: Sim2, config: RefineConfig) -> Sim2:
     """Return ``target_from_source`` aligned to a fraction of a cell, searched from a placement that is right to a cell.
+
+    Each step draws each point to the mean of the walls around it, near ones counting more. Each point counts as much as
+    there are walls around it, so that the pulls of two equal maps cancel out exactly.
 
     Parameters
     ----------
@@ -34,72 +39,123 @@ def polish(target: PreparedMap, wall_cells_m: Points, start: Sim2, config: Refin
         Centres of the source's occupied cells in its grid frame, shape (N, 2).
     start
         ``target_from_source`` that ICP returned; its scale is kept.
+    config
+        Settings.
     """
-    cells_m = evenly(wall_cells_m, config.max_polish_points)
-    pose = start
+    points_m = _near_walls(target, evenly(wall_cells_m, config.max_polish_points), start, config.blur_cells)
+    if len(points_m) < _MIN_PAIRS:
+        return start
+    windows = _Windows(target, len(points_m), config.blur_cells)
+    middle_m = points_m.mean(axis=0)
+    powers = _powers(points_m - middle_m)
+    middle = complex(*middle_m.tolist())
+    turn = start.scale * cmath.exp(1j * start.yaw_rad)
+    place = complex(start.x_m, start.y_m) + turn * middle
     for _ in range(config.iterations):
-        step = _blurred_step(target, pose.apply(cells_m), config.blur_cells)
-        if step is None:
-            return pose
-        pose = step @ pose
-        if _is_still(step):
+        pulls = windows.pulls(powers[:, 1:3], place, turn)
+        if np.count_nonzero(pulls[0]) < _MIN_PAIRS:
             break
-    return pose
+        moved, factor = _motion(pulls.astype(np.float64) @ powers, turn, target.resolution_m)
+        place, turn = place + moved, turn * factor
+        if abs(moved) < _CONVERGED_M and abs(cmath.phase(factor)) < _CONVERGED_RAD:
+            break
+    corner = place - turn * middle
+    return Sim2(corner.real, corner.imag, cmath.phase(turn), start.scale)
 
 
-def _blurred_step(target: PreparedMap, points_m: Points, blur_cells: float) -> Sim2 | None:
-    """One step: draw each point to the mean of the walls around it, near ones counting more.
+def _near_walls(target: PreparedMap, points_m: Points, start: Sim2, blur_cells: float) -> Points:
+    """Return the points that have walls around them, or would have if they moved by a few cells: others say nothing."""
+    reach_m = (math.sqrt(2.0) * math.ceil(3.0 * blur_cells) + _SLACK_CELLS) * target.resolution_m
+    reach_m += _SLACK_SQUARES * target.nearest.cell_m
+    if reach_m > (target.margin - 2) * target.resolution_m:
+        # of coarse cells, that is further than the nearest wall is known
+        return points_m
+    x_m, y_m = start.apply(points_m).T.astype(np.float32)
+    return points_m[target.nearest.distance_m(target.nearest.wall_at(x_m, y_m), x_m, y_m) <= reach_m]
 
-    Each point counts as much as there are walls around it, so that the pulls of two equal maps cancel out exactly.
+
+def _powers(arms_m: Points) -> NDArray[np.float64]:
+    """Return 1, x, y and x² + y² of points, shape (N, 4)."""
+    return np.concatenate([np.ones((len(arms_m), 1)), arms_m, np.square(arms_m).sum(axis=1, keepdims=True)], axis=1)
+
+
+class _Windows:
+    """The walls of a map in the square of cells around each of some points, which move little from step to step.
+
+    Parameters
+    ----------
+    target
+        The map.
+    count
+        Number of points.
+    blur_cells
+        Standard deviation by which walls are blurred: the squares reach three times as far.
     """
-    place = points_m.T / target.resolution_m + target.margin
-    weight, pull_x, pull_y = _pulls(target, place, blur_cells)
-    drawn = np.flatnonzero(weight > 0)
-    if len(drawn) < _MIN_PAIRS:
-        return None
-    drawn_weight, points = weight[drawn].astype(np.float64), points_m[drawn]
-    error = np.stack([pull_x[drawn], pull_y[drawn]], axis=1).astype(np.float64) / drawn_weight[:, None]
-    centre = points.mean(axis=0)
-    return _rigid_motion(points - centre, error * target.resolution_m, drawn_weight, centre)
+
+    def __init__(self, target: PreparedMap, count: int, blur_cells: float) -> None:
+        self._target, self._sharpness = target, np.float32(-0.5 / blur_cells**2)
+        self._reach = math.ceil(3.0 * blur_cells)
+        self._around = np.arange(-self._reach, self._reach + 1)
+        self._middles = (self._around + 0.5).astype(np.float32)[:, None]
+        self._cell = np.full((2, count), -1, np.intp)
+        side = len(self._around)
+        self._walls = np.empty((side, side, count), np.float32)
+
+    def pulls(self, arms_m: Points, place: complex, turn: complex) -> Floats:
+        """Return how much wall is around each point, and the sums of the ways to it in x and y, in cells: shape (3, N).
+
+        Parameters
+        ----------
+        arms_m
+            The points from their middle, in the source's frame, shape (N, 2).
+        place, turn
+            Where their middle is placed, x + iy in metres, and their scale times their turn, as a complex number.
+        """
+        target, reach = self._target, self._reach
+        in_cells = turn / target.resolution_m
+        corner = place / target.resolution_m + complex(target.margin, target.margin)
+        at = np.array([[in_cells.real, -in_cells.imag], [in_cells.imag, in_cells.real]]) @ arms_m.T
+        at += [[corner.real], [corner.imag]]
+        rows, cols = target.classes.shape
+        # a window that would leave the map lies in its margin instead, where there is no wall
+        cell = np.clip(np.floor(at), reach, [[cols - 1 - reach], [rows - 1 - reach]])
+        self._look(cell.astype(np.intp))
+        # shapes (2R + 1, N): the way from the place to the middles of the window's columns and rows
+        way_x, way_y = (cell - at).astype(np.float32)[:, None] + self._middles
+        near_x, near_y = np.exp(way_x * way_x * self._sharpness), np.exp(way_y * way_y * self._sharpness)
+        # sums over the columns of each row of the window, then over its rows
+        in_rows, along_rows = (self._walls * near_x).sum(axis=1), (self._walls * (near_x * way_x)).sum(axis=1)
+        along_rows *= near_y
+        in_rows *= near_y
+        return np.stack([in_rows.sum(axis=0), along_rows.sum(axis=0), (in_rows * way_y).sum(axis=0)])
+
+    def _look(self, cell: NDArray[np.intp]) -> None:
+        """Look at the walls again around points that have come to another cell: after the first step, few have."""
+        moved = np.flatnonzero((cell != self._cell).any(axis=0))
+        cols = self._target.classes.shape[1]
+        window = (self._around[:, None] * cols + self._around)[:, :, None] + (cell[1, moved] * cols + cell[0, moved])
+        self._walls[:, :, moved] = self._target.classes.ravel().take(window) == CELL_OCCUPIED
+        self._cell = cell
 
 
-def _pulls(target: PreparedMap, place: Points, blur_cells: float) -> tuple[Floats, Floats, Floats]:
-    """Return how much wall is around each place, in cells, shape (2, N), and the sums of the ways to it in x and y."""
-    reach = math.ceil(3.0 * blur_cells)
-    rows, cols = target.classes.shape
-    # a window that would leave the map lies in its margin instead, where there is no wall
-    largest = np.array([[cols - 1 - reach], [rows - 1 - reach]])
-    cell = np.clip(np.floor(place), reach, largest).astype(np.intp)
-    around = np.arange(-reach, reach + 1)
-    # shapes (2R + 1, N): the way from the place to the middles of the window's columns and rows
-    way_x, way_y = ((cell - place)[:, None] + (around + 0.5)[:, None]).astype(np.float32)
-    near_x, near_y = (np.exp(np.square(way) * np.float32(-0.5 / blur_cells**2)) for way in (way_x, way_y))
-    window = (around[:, None] * cols + around)[:, :, None] + (cell[1] * cols + cell[0])
-    walls = (target.classes.ravel().take(window) == CELL_OCCUPIED).astype(np.float32)
-    # sums over the columns of each row of the window, then over its rows
-    in_rows, along_rows = (walls * near_x).sum(axis=1), (walls * (near_x * way_x)).sum(axis=1)
-    return (
-        np.asarray((in_rows * near_y).sum(axis=0), np.float32),
-        np.asarray((along_rows * near_y).sum(axis=0), np.float32),
-        np.asarray((in_rows * (near_y * way_y)).sum(axis=0), np.float32),
-    )
+def _motion(sums: NDArray[np.float64], turn: complex, resolution_m: float) -> tuple[complex, complex]:
+    """Return how far the middle of the points moves, and the turn about it, that best follow the pulls (closed form).
 
-
-def _is_still(step: Sim2) -> bool:
-    return math.hypot(step.x_m, step.y_m) < _CONVERGED_M and abs(step.yaw_rad) < _CONVERGED_RAD
-
-
-def _rigid_motion(arms: Points, error: Points, weight: NDArray[np.float64], centre: Points) -> Sim2:
-    """Return the motion about ``centre`` that best moves the points by their errors (weighted, closed form)."""
-    total = weight.sum()
-    mean_arm = weight @ arms / total
-    mean_error = weight @ error / total
-    before, after = arms - mean_arm, arms + error - (mean_arm + mean_error)
-    cross = float(weight @ (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]))
-    dot = float(weight @ (before[:, 0] * after[:, 0] + before[:, 1] * after[:, 1]))
-    yaw_rad = math.atan2(cross, dot)
-    turned = Sim2(yaw_rad=yaw_rad)
-    pivot = centre + mean_arm
-    moved_x, moved_y = turned.apply_point(float(pivot[0]), float(pivot[1]))
-    shift = pivot + mean_error
-    return Sim2(float(shift[0]) - moved_x, float(shift[1]) - moved_y, yaw_rad)
+    Parameters
+    ----------
+    sums
+        Of the weight and of the pulls in x and y, in cells, each times `_powers` of the points: shape (3, 4).
+    turn
+        The points' scale times their turn, as a complex number.
+    resolution_m
+        Side of a cell.
+    """
+    (total, arm_x, arm_y, square), (along_x, xx, yx, _), (along_y, xy, yy, _) = sums.tolist()
+    arm = complex(arm_x, arm_y) / total
+    error = resolution_m * complex(along_x, along_y) / total
+    # of points about their weighted middle, turned as they are
+    pull = resolution_m * complex(xx + yy, xy - yx) / total
+    spread = abs(turn) ** 2 * (square / total - abs(arm) ** 2)
+    factor = spread + turn.conjugate() * (pull - arm.conjugate() * error)
+    factor /= abs(factor) or 1.0
+    return turn * arm + error - factor * turn * arm, factor
