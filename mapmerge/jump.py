@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mapmerge.config import MergeConfig
 from mapmerge.grid import UNKNOWN, Cells, Grid, Mask
-from mapmerge.lattice import offset_cells
+from mapmerge.lattice import cells_in, offset_cells
 from mapmerge.plane import Box
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import IDENTITY
@@ -43,7 +43,7 @@ def jump(before: Grid, after: Grid, changed: Box | None, known_m2: float, config
         kept_m2 = int(np.count_nonzero((old >= 0) & (new >= 0))) * after.resolution_m**2
     else:
         around = changed.padded(math.ceil(config.verify.tolerance_m / after.resolution_m) + 2)
-        old, new = _read(before, around.shifted(*offset)), _read(after, around)
+        old, new = cells_in(before, around.shifted(*offset)), cells_in(after, around)
         kept_m2 = known_m2 - int(np.count_nonzero((old >= 0) & (new < 0))) * after.resolution_m**2
     if kept_m2 < config.watch.least_kept_share * known_m2:
         message = f"of the {known_m2:.0f} m² that it knew before it still knows {kept_m2:.0f} m²"
@@ -80,14 +80,3 @@ def _far(walls: Mask, distance_cells: float) -> Mask:
         cv2.distanceTransform(np.where(walls, np.uint8(0), np.uint8(255)), cv2.DIST_L2, cv2.DIST_MASK_5), np.float32
     )
     return np.asarray(distance > distance_cells, np.bool_)
-
-
-def _read(grid: Grid, box: Box) -> Cells:
-    """Return the cells of a box, unknown where there are none."""
-    whole = Box(0, 0, *grid.cells.shape)
-    inside = box.within(whole)
-    if inside == box:
-        return grid.cells[box.slices(whole)]
-    cells = np.full(box.shape, UNKNOWN, np.int8)
-    cells[inside.slices(box)] = grid.cells[inside.slices(whole)]
-    return cells

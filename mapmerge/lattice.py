@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from mapmerge.grid import Cells, Grid, Mask
+from mapmerge.grid import UNKNOWN, Cells, Grid, Mask
 from mapmerge.plane import NOTHING, Box
 
 _BAND_ROWS = 64
@@ -46,6 +46,17 @@ def changed_box(before: Grid, after: Grid) -> Box | None:
     if both != there:
         found = found.union(_known_outside(before, there, both))
     return found
+
+
+def cells_in(grid: Grid, box: Box) -> Cells:
+    """Return the cells of a box, counted from the grid's first, unknown where there are none."""
+    whole = Box(0, 0, *grid.cells.shape)
+    inside = box.within(whole)
+    if inside == box:
+        return grid.cells[box.slices(whole)]
+    cells = np.full(box.shape, UNKNOWN, np.int8)
+    cells[inside.slices(box)] = grid.cells[inside.slices(whole)]
+    return cells
 
 
 def box_of(mask: Mask) -> Box:

@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
+import numpy as np
+
 from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError
 from mapmerge.evidence import Evidence
@@ -17,7 +19,7 @@ from mapmerge.fuse import Canvas, Fusion
 from mapmerge.graph import Edge, Forest, place
 from mapmerge.grid import Grid
 from mapmerge.jump import jump
-from mapmerge.lattice import changed_box
+from mapmerge.lattice import cells_in, changed_box, offset_cells
 from mapmerge.match import Match, load_matcher
 from mapmerge.outcome import Change, Looked, Pair, RobotOutcome, Status, changes_of, outcomes_of
 from mapmerge.pairs import Mapped, News, Pairs
@@ -129,12 +131,15 @@ class Merger:
         strangers = sorted(set(updates) - set(robots))
         if strangers:
             raise ConfigError(f"there are maps of {', '.join(strangers)}; expected only maps of {', '.join(robots)}")
-        updated = tuple(robot for robot in robots if _is_new(updates.get(robot), self.result.grids.get(robot)))
+        arrivals = {robot: self._arrival(robot, updates[robot]) for robot in robots if robot in updates}
+        new = {robot: arrival for robot, arrival in arrivals.items() if arrival is not None}
+        updated = tuple(new)
         if not updated and not is_last:
             self.result = replace(self.result, updated=(), changes=(), searched={})
             return self.result
-        jumped, changed = self._take({robot: updates[robot] for robot in updated})
-        latest = {**self.result.grids, **{robot: updates[robot] for robot in updated}}
+        jumped = self._take(new)
+        changed = {robot: arrival.changed for robot, arrival in new.items() if arrival.changed is not None}
+        latest = {**self.result.grids, **{robot: arrival.grid for robot, arrival in new.items()}}
         grids = {robot: latest[robot] for robot in robots if robot in latest}
         believed = _pair_priors(robots[0], list(combinations(self._maps, 2)), priors or {}, self.result.priors)
         news = News(frozenset(updated), frozenset(jumped), robots[0], is_last)
@@ -164,27 +169,34 @@ class Merger:
             return self._unions.explain(self._of_merged_maps[pair], self._maps)
         return self._pairs.explain(pair, self._maps)
 
-    def _take(self, updates: Mapping[str, Grid]) -> tuple[dict[str, Reason], dict[str, Box]]:
-        """Take in maps that are new; return whose map jumped, and which cells changed where that can be said."""
+    def _arrival(self, robot: str, grid: Grid) -> _Arrival | None:
+        """Return a map that came, or None if it says what was known already."""
+        known, before = grid.cropped_to_known(), self._maps.get(robot)
+        if before is None:
+            is_first = robot not in self.result.grids or known.cells.size > 0
+            return _Arrival(grid, known, None) if is_first else None
+        changed = changed_box(before, known)
+        return None if changed is not None and changed.is_empty else _Arrival(grid, known, changed)
+
+    def _take(self, new: Mapping[str, _Arrival]) -> dict[str, Reason]:
+        """Take in maps that are new; return whose map jumped."""
         jumped: dict[str, Reason] = {}
-        changed: dict[str, Box] = {}
-        for robot, grid in updates.items():
-            after = grid.cropped_to_known()
+        for robot, arrival in new.items():
             before, known = self._maps.pop(robot, None), self._known.pop(robot, None)
+            after, changed = arrival.known, arrival.changed
             if after.cells.size == 0:
                 continue
-            self._maps[robot], self._known[robot] = after, _Known(after.known_area_m2, after.middle_m)
+            self._maps[robot] = after
+            cells = _known_cells(before, after, changed, known)
+            self._known[robot] = _Known(cells, cells * after.resolution_m**2, after.middle_m)
             if before is None or known is None:
                 continue
-            box = changed_box(before, after)
-            if box is not None:
-                changed[robot] = box
-            reason = jump(before, after, box, known.area_m2, self._config)
+            reason = jump(before, after, changed, known.area_m2, self._config)
             if reason is not None:
                 jumped[robot] = reason
         # in the order of the robots, whenever their maps came
         self._maps = {robot: self._maps[robot] for robot in self.result.robots if robot in self._maps}
-        return jumped, changed
+        return jumped
 
     def _match_pairs(self, believed: Mapping[Pair, Prior], news: News) -> dict[Pair, Trigger]:
         """Bring the matches of pairs up to date; return which were searched, and why."""
@@ -229,16 +241,34 @@ class Merger:
         return changes
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Arrival:
+    """A map that came: all of it, what it knows, and the box of `mapmerge.lattice.changed_box` since the one before."""
+
+    grid: Grid
+    known: Grid
+    changed: Box | None
+
+
 @dataclass(frozen=True, slots=True)
 class _Known:
-    """What a map knows: its area, and the middle of the rectangle around it in the map frame."""
+    """What a map knows: how many cells, their area, and the middle of the rectangle around them in the map frame."""
 
+    cells: int
     area_m2: float
     centre_m: tuple[float, float]
 
 
-def _is_new(update: Grid | None, known: Grid | None) -> bool:
-    return update is not None and (known is None or not update.same_as(known))
+def _known_cells(before: Grid | None, after: Grid, changed: Box | None, known: _Known | None) -> int:
+    """Return how many cells a map knows, counted only where it changed."""
+    if before is None or known is None or changed is None:
+        return int(np.count_nonzero(after.known))
+    offset = offset_cells(before, after) or (0, 0)
+    return (
+        known.cells
+        + int(np.count_nonzero(cells_in(after, changed) >= 0))
+        - int(np.count_nonzero(cells_in(before, changed.shifted(*offset)) >= 0))
+    )
 
 
 def _pair_priors(
