@@ -104,7 +104,7 @@ class SearchConfig(Settings):
     free_weights: tuple[float, ...] = (0.5, 1.8)
     shifts: int = 8
     peak_distance_m: float = 0.8
-    max_side_cells: int = 1000
+    max_side_cells: int = 640
     max_candidates: int = 40
     sweep_step_rad: float = math.radians(2.5)
     sweep_cell_m: float = 0.25
