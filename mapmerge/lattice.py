@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from mapmerge.grid import Cells, Grid, Mask
-from mapmerge.plane import NOTHING, Box
+from mapmerge.grid import UNKNOWN, Cells, Grid, Mask
+from mapmerge.plane import NOTHING, Box, read
 
 _BAND_ROWS = 64
 _WHOLE = 1e-3
@@ -46,6 +46,22 @@ def changed_box(before: Grid, after: Grid) -> Box | None:
     if both != there:
         found = found.union(_known_outside(before, there, both))
     return found
+
+
+def same_within(before: Grid, after: Grid, offset: tuple[int, int], box: Box) -> bool:
+    """Tell whether two grids say the same in a box of cells, counted from the first of ``after``.
+
+    A cell beyond a grid is as good as unknown.
+
+    Parameters
+    ----------
+    offset
+        Of the grids, see `offset_cells`.
+    """
+    if box.is_empty:
+        return True
+    here, there = read(after.cells, box, UNKNOWN), read(before.cells, box.shifted(*offset), UNKNOWN)
+    return not cv2.norm(here, there, cv2.NORM_INF)
 
 
 def box_of(mask: Mask) -> Box:
