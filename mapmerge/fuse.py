@@ -16,7 +16,7 @@ import numpy as np
 
 from mapmerge.config import CellConfig
 from mapmerge.grid import UNKNOWN, Cells, Grid
-from mapmerge.lattice import changed_box, offset_cells
+from mapmerge.lattice import changed_box, offset_cells, same_within
 from mapmerge.odds import Counts, Fused, LogOdds
 from mapmerge.plane import NOTHING, Box, Plane
 from mapmerge.sim2 import Sim2
@@ -88,7 +88,7 @@ class Canvas:
         self._known = 0
         self._tiles: dict[Box, Fused] = {}
         self._cells = Plane(np.int8, UNKNOWN)
-        self._is_published = False
+        # what was given away last, until a cell differs
         self._grid: Grid | None = None
 
     def update(self, layers: Mapping[str, Layer], lattice: Grid, changed: Mapping[str, Box] | None = None) -> Fusion:
@@ -107,7 +107,7 @@ class Canvas:
         if self._lattice is None or offset_cells(self._lattice, lattice) is None:
             self._lattice, self._grid = lattice, None
             self._warps, self._counts, self._known, self._tiles = {}, {}, 0, {}
-            self._cells, self._is_published = Plane(np.int8, UNKNOWN), False
+            self._cells = Plane(np.int8, UNKNOWN)
         warps = {name: self._warp(name, layer, self._lattice) for name, layer in layers.items()}
         dirty = {
             tile
@@ -116,24 +116,22 @@ class Canvas:
         }
         self._warps = warps
         self._counts = {name: self._counts.get(name, Counts()) for name in warps}
-        is_same = not self._cover(warps.values()) and self._grid is not None
+        self._cover(warps.values())
         for tile in sorted(dirty):
-            is_same &= not self._renew(tile)
-        if self._grid is None or not is_same:
+            self._renew(tile)
+        if self._grid is None:
             self._grid = self._published(self._lattice)
         cell_m2 = lattice.resolution_m**2
         return Fusion(self._grid, tuple(_agreement(count, self._known, cell_m2) for count in self._counts.values()))
 
-    def _cover(self, warps: Iterable[Warp]) -> bool:
-        """Cover just what some layers reach; tell whether that changed."""
+    def _cover(self, warps: Iterable[Warp]) -> None:
+        """Cover just what some layers reach."""
         covered = NOTHING
         for warp in warps:
             covered = covered.union(warp.box)
-        if covered == self._cells.box:
-            return False
-        self._cells.cover(covered)
-        self._is_published = False
-        return True
+        if covered != self._cells.box:
+            self._cells.cover(covered)
+            self._grid = None
 
     def _warp(self, name: str, layer: Layer, lattice: Grid) -> Warp:
         known = self._warps.get(name)
@@ -149,33 +147,30 @@ class Canvas:
         if before is not None and after is not None and before.layer.merged_from_map == after.layer.merged_from_map:
             found = changed_box(before.layer.grid, after.layer.grid) if changed is None else changed
             if found is not None and not before.is_pooled and not after.is_pooled:
-                yield from _tiles(after.on_canvas(found))
+                yield from _differing(before, after, after.of_map(found))
                 return
         for warp in (before, after):
             if warp is not None:
                 yield from _tiles(warp.box)
 
-    def _renew(self, tile: Box) -> bool:
-        """Fuse the cells of a tile, and count them instead of what was there; tell whether a cell changed."""
+    def _renew(self, tile: Box) -> None:
+        """Fuse the cells of a tile, and count them instead of what was there."""
         self._count(self._tiles.pop(tile, None), -1)
-        on_tile = {name: warp.tile(tile) for name, warp in self._warps.items()}
-        present = {name: cells for name, cells in on_tile.items() if cells is not None}
+        on_tile = {name: own for name, warp in self._warps.items() if (own := warp.tile(tile)) is not None}
         inside = tile.within(self._cells.box)
-        if present:
-            cells, self._tiles[tile] = self._odds.fuse(present)
-            self._count(self._tiles[tile], 1)
-            new = cells[inside.slices(tile)]
-        else:
-            new = np.full(inside.shape, UNKNOWN, np.int8)
-        if np.array_equal(self._cells.part(inside), new):
-            return False
-        self._write(inside, new)
-        return True
+        if not on_tile:
+            self._write(inside, np.full(inside.shape, UNKNOWN, np.int8))
+            return
+        cells, self._tiles[tile] = self._odds.fuse(on_tile)
+        self._count(self._tiles[tile], 1)
+        self._write(inside, cells[inside.slices(tile)])
 
     def _write(self, box: Box, cells: Cells) -> None:
-        """Write cells of the merged map: to a copy, if they are those of a grid that was given away."""
-        if self._is_published:
-            self._cells.cells, self._is_published = self._cells.cells.copy(), False
+        """Write cells of the merged map: to a copy, if they differ from those of the grid that was given away."""
+        if self._grid is not None:
+            if np.array_equal(self._cells.part(box), cells):
+                return
+            self._cells.cells, self._grid = self._cells.cells.copy(), None
         self._cells.part(box)[:] = cells
 
     def _count(self, fused: Fused | None, sign: int) -> None:
@@ -188,8 +183,16 @@ class Canvas:
     def _published(self, lattice: Grid) -> Grid:
         box = self._cells.box
         corner = Sim2(box.left * lattice.resolution_m, box.top * lattice.resolution_m)
-        self._is_published = True
-        return Grid(self._cells.cells, lattice.resolution_m, lattice.map_from_grid @ corner)
+        return Grid(self._cells.cells, lattice.resolution_m, lattice.map_from_grid @ corner, has_valid_values=True)
+
+
+def _differing(before: Warp, after: Warp, changed: Box) -> Iterator[Box]:
+    """Yield the tiles under which a layer's cells differ, if none does outside of a box of them."""
+    offset = offset_cells(before.grid, after.grid)
+    for tile in _tiles(after.over(changed)):
+        under = after.under(tile).within(changed)
+        if offset is None or not same_within(before.grid, after.grid, offset, under):
+            yield tile
 
 
 def _tiles(box: Box) -> Iterator[Box]:

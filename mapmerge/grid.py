@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,8 @@ class Grid:
         Side of a cell.
     map_from_grid
         Pose in the map frame of the outer corner of cell (0, 0), rigid: ``info.origin`` of the message.
+    has_valid_values
+        Whether the cells are from other grids, so that their values need not be checked again.
 
     Raises
     ------
@@ -54,8 +56,9 @@ class Grid:
     cells: Cells
     resolution_m: float
     map_from_grid: Sim2 = field(default=IDENTITY)
+    has_valid_values: InitVar[bool] = False
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, has_valid_values: bool) -> None:
         if self.cells.ndim != 2 or self.cells.dtype != np.int8:
             raise GridError(f"cells are {self.cells.dtype} of shape {self.cells.shape}; expected int8 [rows, columns]")
         if not (math.isfinite(self.resolution_m) and self.resolution_m > 0.0):
@@ -63,9 +66,8 @@ class Grid:
         if max(self.cells.shape) > MAX_SIDE_CELLS:
             rows, cols = self.cells.shape
             raise GridError(f"the grid has {cols} × {rows} cells; a side of at most {MAX_SIDE_CELLS} is expected")
-        if self.cells.size and not (self.cells.min() >= UNKNOWN and self.cells.max() <= MAX_PERCENT):
-            low, high = self.cells.min(), self.cells.max()
-            raise GridError(f"cells are between {low} and {high}; expected {UNKNOWN} (unknown) or 0 to {MAX_PERCENT}")
+        if self.cells.size and not has_valid_values:
+            self._check_values()
         pose = self.map_from_grid
         if not all(map(math.isfinite, (pose.x_m, pose.y_m, pose.yaw_rad))):
             raise GridError(f"the origin is ({pose.x_m}, {pose.y_m}, {pose.yaw_rad}); finite numbers are expected")
@@ -75,6 +77,11 @@ class Grid:
             view = self.cells.view()
             view.flags.writeable = False
             object.__setattr__(self, "cells", view)
+
+    def _check_values(self) -> None:
+        low, high = self.cells.min(), self.cells.max()
+        if low < UNKNOWN or high > MAX_PERCENT:
+            raise GridError(f"cells are between {low} and {high}; expected {UNKNOWN} (unknown) or 0 to {MAX_PERCENT}")
 
     @property
     def rows(self) -> int:
@@ -127,7 +134,7 @@ class Grid:
         row, col = int(rows[0]), int(cols[0])
         corner = Sim2(col * self.resolution_m, row * self.resolution_m)
         cells = self.cells[row : int(rows[-1]) + 1, col : int(cols[-1]) + 1]
-        return Grid(cells, self.resolution_m, self.map_from_grid @ corner)
+        return Grid(cells, self.resolution_m, self.map_from_grid @ corner, has_valid_values=True)
 
     def _edges(self) -> tuple[Cells, ...]:
         return self.cells[0], self.cells[-1], self.cells[:, 0], self.cells[:, -1]

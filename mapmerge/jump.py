@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from mapmerge.config import MergeConfig
 from mapmerge.grid import UNKNOWN, Cells, Grid, Mask
-from mapmerge.lattice import cells_in, offset_cells
-from mapmerge.plane import Box
+from mapmerge.lattice import offset_cells
+from mapmerge.plane import Box, read
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import IDENTITY
 from mapmerge.warp import Layer, warped
@@ -43,7 +43,7 @@ def jump(before: Grid, after: Grid, changed: Box | None, known_m2: float, config
         kept_m2 = int(np.count_nonzero((old >= 0) & (new >= 0))) * after.resolution_m**2
     else:
         around = changed.padded(math.ceil(config.verify.tolerance_m / after.resolution_m) + 2)
-        old, new = cells_in(before, around.shifted(*offset)), cells_in(after, around)
+        old, new = read(before.cells, around.shifted(*offset), UNKNOWN), read(after.cells, around, UNKNOWN)
         kept_m2 = known_m2 - int(np.count_nonzero((old >= 0) & (new < 0))) * after.resolution_m**2
     if kept_m2 < config.watch.least_kept_share * known_m2:
         message = f"of the {known_m2:.0f} m² that it knew before it still knows {kept_m2:.0f} m²"

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from mapmerge.grid import UNKNOWN, Cells, Grid, Mask
-from mapmerge.plane import NOTHING, Box
+from mapmerge.plane import NOTHING, Box, read
 
 _BAND_ROWS = 64
 _WHOLE = 1e-3
@@ -48,15 +48,20 @@ def changed_box(before: Grid, after: Grid) -> Box | None:
     return found
 
 
-def cells_in(grid: Grid, box: Box) -> Cells:
-    """Return the cells of a box, counted from the grid's first, unknown where there are none."""
-    whole = Box(0, 0, *grid.cells.shape)
-    inside = box.within(whole)
-    if inside == box:
-        return grid.cells[box.slices(whole)]
-    cells = np.full(box.shape, UNKNOWN, np.int8)
-    cells[inside.slices(box)] = grid.cells[inside.slices(whole)]
-    return cells
+def same_within(before: Grid, after: Grid, offset: tuple[int, int], box: Box) -> bool:
+    """Tell whether two grids say the same in a box of cells, counted from the first of ``after``.
+
+    A cell beyond a grid is as good as unknown.
+
+    Parameters
+    ----------
+    offset
+        Of the grids, see `offset_cells`.
+    """
+    if box.is_empty:
+        return True
+    here, there = read(after.cells, box, UNKNOWN), read(before.cells, box.shifted(*offset), UNKNOWN)
+    return not cv2.norm(here, there, cv2.NORM_INF)
 
 
 def box_of(mask: Mask) -> Box:

@@ -17,13 +17,13 @@ from mapmerge.errors import ConfigError
 from mapmerge.evidence import Evidence
 from mapmerge.fuse import Canvas, Fusion
 from mapmerge.graph import Edge, Forest, place
-from mapmerge.grid import Grid
+from mapmerge.grid import UNKNOWN, Grid
 from mapmerge.jump import jump
-from mapmerge.lattice import cells_in, changed_box, offset_cells
+from mapmerge.lattice import changed_box, offset_cells
 from mapmerge.match import Match, load_matcher
 from mapmerge.outcome import Change, Looked, Pair, RobotOutcome, Status, changes_of, outcomes_of
 from mapmerge.pairs import Mapped, News, Pairs
-from mapmerge.plane import Box
+from mapmerge.plane import Box, read
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
@@ -266,8 +266,8 @@ def _known_cells(before: Grid | None, after: Grid, changed: Box | None, known: _
     offset = offset_cells(before, after) or (0, 0)
     return (
         known.cells
-        + int(np.count_nonzero(cells_in(after, changed) >= 0))
-        - int(np.count_nonzero(cells_in(before, changed.shifted(*offset)) >= 0))
+        + int(np.count_nonzero(read(after.cells, changed, UNKNOWN) >= 0))
+        - int(np.count_nonzero(read(before.cells, changed.shifted(*offset), UNKNOWN) >= 0))
     )
 
 

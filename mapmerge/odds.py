@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +15,8 @@ from mapmerge.warp import Bytes
 
 _UNIT = 1_000_000
 _P_MIN = 0.01
+# what two layers say of a cell: the first or the second knows it, or both do, and then agree or contradict each other
+_FIRST, _SECOND, _BOTH, _AGREE, _DISAGREE = (np.uint8(1 << bit) for bit in range(5))
 
 Whole = NDArray[np.int32]
 
@@ -67,19 +70,42 @@ class LogOdds:
         self._negative: Whole = np.minimum(table, 0)
         self._occupied = int(table[config.min_occupied_percent])
         self._free = int(table[config.max_free_percent])
-        one, other = np.divmod(np.arange(1 << 16), 1 << 8)
-        positive, negative = self._sums([one, other])
-        self._pair_cells = _fused_percent(positive, negative)
-        agree, disagree = self._compared(one, positive, negative)
-        self._pair_relation = agree.view(np.uint8) + np.uint8(2) * disagree.view(np.uint8)
+        self._pairs = self._of_pairs()
 
     def fuse(self, tiles: Mapping[str, Bytes]) -> tuple[Cells, Fused]:
         """Fuse the cells of a tile, given by layer, at least one; return them, and how the layers agree there."""
-        known = {name: tile <= MAX_PERCENT for name, tile in tiles.items()}
         if len(tiles) == 1:
-            (name, tile), (is_known,) = *tiles.items(), known.values()
-            count = int(np.count_nonzero(is_known))
+            ((name, tile),) = tiles.items()
+            count = int(np.count_nonzero(tile <= MAX_PERCENT))
             return tile.view(np.int8), Fused({name: Counts(known=count)}, count)
+        return self._fuse_pair(tiles) if len(tiles) == 2 else self._fuse_many(tiles)
+
+    def _fuse_pair(self, tiles: Mapping[str, Bytes]) -> tuple[Cells, Fused]:
+        """Fuse two layers: a look-up."""
+        one, other = tiles.values()
+        looked_up = np.asarray(cv2.LUT(one.astype(np.uint16) * np.uint16(256) + other, self._pairs), np.uint16)
+        said = np.right_shift(looked_up, 8).astype(np.uint8)
+        bits = (_FIRST, _SECOND, _BOTH, _AGREE, _DISAGREE)
+        known, others_known, overlap, agree, disagree = [int(np.count_nonzero(said & bit)) for bit in bits]
+        counts = [Counts(known, overlap, agree, disagree), Counts(others_known, overlap, agree, disagree)]
+        fused = Fused(dict(zip(tiles, counts, strict=True)), known + others_known - overlap)
+        return looked_up.astype(np.uint8).view(np.int8), fused
+
+    def _of_pairs(self) -> NDArray[np.uint16]:
+        """Return for all pairs of bytes what the cell becomes, as the lower byte, and what they say, as the upper."""
+        one, other = np.divmod(np.arange(1 << 16), 1 << 8)
+        first, second = one <= MAX_PERCENT, other <= MAX_PERCENT
+        both = first & second
+        positive, negative = self._sums([one, other])
+        agree, disagree = self._compared(one, positive, negative)
+        alone = np.where(first, one, np.where(second, other, UNKNOWN_BYTE))
+        cells = np.where(both, _fused_percent(positive, negative).view(np.uint8), alone)
+        said = first * _FIRST | second * _SECOND | both * (_BOTH | agree * _AGREE | disagree * _DISAGREE)
+        return np.asarray(cells + said.astype(np.uint16) * np.uint16(256), np.uint16)
+
+    def _fuse_many(self, tiles: Mapping[str, Bytes]) -> tuple[Cells, Fused]:
+        """Fuse more than two layers, counting which cells at least two of them know."""
+        known = {name: tile <= MAX_PERCENT for name, tile in tiles.items()}
         layers_known = np.zeros(next(iter(tiles.values())).shape, np.uint8 if len(tiles) < 256 else np.int32)
         cells: Cells = np.full(layers_known.shape, UNKNOWN, np.int8)
         for name, tile in tiles.items():
@@ -89,24 +115,10 @@ class LogOdds:
         own = {name: tile.ravel()[shared] for name, tile in tiles.items()}
         counts = {name: Counts(known=int(np.count_nonzero(known[name]))) for name in tiles}
         if len(shared):
-            fused, more = self._fuse_pair(own) if len(own) == 2 else self._fuse_many(own)
-            cells.ravel()[shared] = fused
-            counts = {name: counts[name].plus(more[name]) for name in tiles}
+            positive, negative = self._sums(list(own.values()))
+            cells.ravel()[shared] = _fused_percent(positive, negative)
+            counts = {name: counts[name].plus(self._count(own[name], positive, negative)) for name in tiles}
         return cells, Fused(counts, int(np.count_nonzero(layers_known)))
-
-    def _fuse_pair(self, own: Mapping[str, Bytes]) -> tuple[Cells, dict[str, Counts]]:
-        """Fuse cells that both of two layers know: a look-up."""
-        one, other = own.values()
-        both = one.astype(np.uint16) * np.uint16(256) + other
-        relations = np.bincount(self._pair_relation[both], minlength=3).tolist()
-        count = Counts(overlap=len(both), agree=relations[1], disagree=relations[2])
-        return self._pair_cells[both], dict.fromkeys(own, count)
-
-    def _fuse_many(self, own: Mapping[str, Bytes]) -> tuple[Cells, dict[str, Counts]]:
-        """Fuse cells that at least two of some layers know."""
-        positive, negative = self._sums(list(own.values()))
-        counts = {name: self._count(values, positive, negative) for name, values in own.items()}
-        return _fused_percent(positive, negative), counts
 
     def _sums(self, layers: Sequence[NDArray[np.integer]]) -> tuple[Whole, Whole]:
         positive, negative = self._positive[layers[0]], self._negative[layers[0]]

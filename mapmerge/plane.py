@@ -98,7 +98,7 @@ class Plane:
         """Cover exactly this box; values inside of it are kept, those outside of it are forgotten."""
         if box == self.box:
             return
-        cells = self._blanks(box)
+        cells = _blanks(box, self.cells.dtype, self._blank)
         kept = box.within(self.box)
         cells[kept.slices(box)] = self.cells[kept.slices(self.box)]
         self.box, self.cells = box, cells
@@ -109,14 +109,19 @@ class Plane:
 
     def read(self, box: Box) -> NDArray[Any]:
         """Return the values of any box, blank where it is not covered: a view if all of it is, else a copy."""
-        inside = box.within(self.box)
-        if inside == box:
-            return self.part(box)
-        values = self._blanks(box)
-        values[inside.slices(box)] = self.cells[inside.slices(self.box)]
-        return values
+        return read(self.cells, box.shifted(-self.box.top, -self.box.left), self._blank)
 
-    def _blanks(self, box: Box) -> NDArray[Any]:
-        if self._blank:
-            return np.full(box.shape, self._blank, self.cells.dtype)
-        return np.zeros(box.shape, self.cells.dtype)
+
+def read(cells: NDArray[Any], box: Box, blank: int) -> NDArray[Any]:
+    """Return the values of any box of an array, blank beyond it: a view if all of it is inside, else a copy."""
+    whole = Box(0, 0, *cells.shape)
+    inside = box.within(whole)
+    if inside == box:
+        return cells[box.slices(whole)]
+    values = _blanks(box, cells.dtype, blank)
+    values[inside.slices(box)] = cells[inside.slices(whole)]
+    return values
+
+
+def _blanks(box: Box, dtype: Any, blank: int) -> NDArray[Any]:  # noqa: ANN401 - whatever numpy takes
+    return np.full(box.shape, blank, dtype) if blank else np.zeros(box.shape, dtype)

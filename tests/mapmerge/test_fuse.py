@@ -10,6 +10,7 @@ from mapmerge import fuse as fuse_module
 from mapmerge.config import CellConfig
 from mapmerge.fuse import Canvas, fuse
 from mapmerge.grid import Grid
+from mapmerge.odds import LogOdds
 from mapmerge.sim2 import IDENTITY, Sim2
 from mapmerge.warp import Layer
 
@@ -320,6 +321,70 @@ class TestCanvas:
         changed = canvas.update({"a": Layer(grid_of(after), IDENTITY)}, grid_of(before)).grid
         assert np.array_equal(given.cells, copied)
         assert changed.same_as(fused(grid_of(after)).grid)
+
+    @pytest.mark.parametrize("pose", [IDENTITY, Sim2(0.7, -0.3), Sim2(0.31, -0.77, 0.4), Sim2(2.0, 1.0, -2.2)])
+    @pytest.mark.parametrize("cell", [(8, 16), (7, 15), (0, 0), (23, 29), (16, 8)])
+    def test_one_cell_renews_no_more_than_the_tiles_around_it(self, monkeypatch, pose, cell):
+        monkeypatch.setattr(fuse_module, "TILE_CELLS", 8)
+        other = Layer(grid_of(blob(2, 40, 40)), Sim2(-0.5, -0.5))
+        before = blob(1)
+        before[[0, 0, -1, -1], [0, -1, 0, -1]] = 0
+        after = before.copy()
+        after[cell] = 100 if before[cell] < 50 else 0
+        canvas = Canvas(CELLS)
+        canvas.update({"a": Layer(grid_of(before), pose), "b": other}, other.grid)
+        renewed = fused_tiles(monkeypatch)
+        kept = canvas.update({"a": Layer(grid_of(after), pose), "b": other}, other.grid)
+        assert 1 <= len(renewed) <= 4
+        assert_as_anew(kept, {"a": Layer(grid_of(after), pose), "b": other}, other.grid)
+
+    @pytest.mark.parametrize("pose", [IDENTITY, Sim2(0.31, -0.77, 0.4)])
+    def test_what_lies_between_two_changes_is_not_renewed(self, monkeypatch, pose):
+        monkeypatch.setattr(fuse_module, "TILE_CELLS", 8)
+        before = np.zeros((80, 80), np.int8)
+        after = before.copy()
+        after[[2, 77], [3, 76]] = 100
+        canvas = Canvas(CELLS)
+        canvas.update({"a": Layer(grid_of(before), pose)}, grid_of([[0]]))
+        renewed = fused_tiles(monkeypatch)
+        kept = canvas.update({"a": Layer(grid_of(after), pose)}, grid_of([[0]]))
+        assert 2 <= len(renewed) <= 8
+        assert_as_anew(kept, {"a": Layer(grid_of(after), pose)}, grid_of([[0]]))
+
+    @pytest.mark.parametrize("tile", [5, 8, 256])
+    @pytest.mark.parametrize("pose", [Sim2(0.7, -0.3), Sim2(0.31, -0.77, 0.4), Sim2(1.0, 2.0, math.pi / 2)])
+    def test_a_map_that_grows_moves_and_shrinks_is_as_fused_anew(self, monkeypatch, tile, pose):
+        monkeypatch.setattr(fuse_module, "TILE_CELLS", tile)
+        cells, other = blob(3, 50, 60), grid_of(blob(4, 40, 40))
+        nothing = np.full((3, 3), -1, np.int8)
+        parts = [(10, 40, 10, 50), (4, 40, 10, 57), (20, 30, 20, 30), (20, 31, 19, 30), None, (0, 50, 0, 60)]
+        canvas = Canvas(CELLS)
+        for turn in (Sim2(), Sim2(yaw_rad=0.01)):
+            for part in parts:
+                top, bottom, left, right = part or (5, 8, 5, 8)
+                shown = cells[top:bottom, left:right] if part else nothing
+                grid = grid_of(shown, origin=Sim2(left * 0.1, top * 0.1))
+                layers = {"a": Layer(other, IDENTITY), "b": Layer(grid, pose @ turn)}
+                assert_as_anew(canvas.update(layers, other), layers, other)
+
+
+def fused_tiles(monkeypatch):
+    """Return a list to which every tile is added that is fused from now on."""
+    tiles = []
+    fuse_tile = LogOdds.fuse
+
+    def recorded(odds, on_tile):
+        tiles.append(on_tile)
+        return fuse_tile(odds, on_tile)
+
+    monkeypatch.setattr(LogOdds, "fuse", recorded)
+    return tiles
+
+
+def assert_as_anew(kept, layers, lattice):
+    anew = Canvas(CELLS).update(layers, lattice)
+    assert kept.grid.same_as(anew.grid)
+    assert kept.agreements == anew.agreements
 
 
 class TestTiles:

@@ -10,7 +10,7 @@ from hypothesis.extra import numpy as hnp
 
 from mapmerge import lattice
 from mapmerge.grid import Grid
-from mapmerge.lattice import box_of, changed_box, offset_cells
+from mapmerge.lattice import box_of, changed_box, offset_cells, same_within
 from mapmerge.plane import NOTHING, Box, Plane
 from mapmerge.sim2 import IDENTITY, Sim2
 from mapmerge.walls import Squares
@@ -67,6 +67,16 @@ def test_what_changed_is_the_smallest_box_that_holds_it(floor, before, after, pa
         assert found.is_empty
     else:
         assert found.shifted(after.top, after.left) == expected
+
+
+@given(floors, windows, windows, windows, boxes, st.sampled_from(FRAMES))
+def test_what_is_the_same_within_a_box_is_what_is_known_there(floor, before, after, part, box, frame):
+    other = floor.copy()
+    other[part.top : part.bottom, part.left : part.right] = 50
+    one, two = seen(floor, before, frame), seen(other, after, frame)
+    inside = cells_of(box.shifted(after.top, after.left))
+    old, new = ({at: says[at] for at in says.keys() & inside} for says in (known(floor, before), known(other, after)))
+    assert same_within(one, two, offset_cells(one, two), box) == (old == new)
 
 
 @given(floors, windows, windows, st.sampled_from(FRAMES))
