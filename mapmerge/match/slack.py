@@ -14,13 +14,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.align import placed, poses_of
+from mapmerge.align import evenly, placed, poses_of
 from mapmerge.config import SlackConfig
 from mapmerge.prepared import PreparedMap
 from mapmerge.score import Tally, far_share, met_at, tally
-from mapmerge.sim2 import Sim2
+from mapmerge.sim2 import Points, Sim2
 
 Floats = NDArray[np.float32]
+
+_ENOUGH_WALLS = 5_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,17 +76,24 @@ class _Field:
 
 def slack(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, config: SlackConfig) -> Slack:
     """Return how well two maps agree at a placement between their grid frames if both may bend a little."""
-    pose = poses_of([target_from_source])
-    x, y = (values[0] for values in placed(pose, source.walls_m))
-    field = _bent(target, x, y, source.wall_spacing_m * target_from_source.scale, config)
+    (walls_m, wall_m), (others_m, other_m) = _sample(source), _sample(target)
+    wall_m *= target_from_source.scale
+    x, y = (values[0] for values in placed(poses_of([target_from_source]), walls_m))
+    field = _bent(target, x, y, wall_m, config)
     shift_x, shift_y = field.at(x, y)
-    ahead = tally(met_at(target, x + shift_x, y + shift_y), source.wall_spacing_m * target_from_source.scale)
-    wall_x, wall_y = target.walls_m.astype(np.float32).T
+    ahead = tally(met_at(target, x + shift_x, y + shift_y), wall_m)
+    wall_x, wall_y = others_m.astype(np.float32).T
     back_x, back_y = field.at(wall_x, wall_y)
     unbent = np.stack([wall_x - back_x, wall_y - back_y], axis=1).astype(np.float64)
     in_source = target_from_source.inverse().apply(unbent).astype(np.float32)
-    back = tally(met_at(source, in_source[:, 0], in_source[:, 1]), target.wall_spacing_m)
+    back = tally(met_at(source, in_source[:, 0], in_source[:, 1]), other_m)
     return Slack(ahead, back)
+
+
+def _sample(prepared: PreparedMap) -> tuple[Points, float]:
+    """Return the walls of a map, of very many some that are evenly spread, and how much wall one stands for."""
+    walls_m = evenly(prepared.walls_m, _ENOUGH_WALLS)
+    return walls_m, prepared.wall_spacing_m * len(prepared.walls_m) / max(1, len(walls_m))
 
 
 def _bent(target: PreparedMap, x: Floats, y: Floats, spacing_m: float, config: SlackConfig) -> _Field:

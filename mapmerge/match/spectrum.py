@@ -19,7 +19,7 @@ Spectrum = NDArray[np.float64]
 Spectra = NDArray[np.float64]
 
 _AT_ONCE = 1 << 15
-_ENOUGH_WALLS = 10_000
+_ENOUGH_WALLS = 5_000
 
 
 def orientation_spectra(walls_m: Points, angle_step_rad: float, bin_m: float) -> Spectra:
