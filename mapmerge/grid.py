@@ -26,8 +26,9 @@ MAX_SIDE_CELLS = 100_000
 def cell_centres_m(rows: Indices, cols: Indices, resolution_m: float) -> Points:
     """Return the centres of cells in the frame of their grid, shape (N, 2), as x and y."""
     centres: Points = np.empty((len(rows), 2), np.float64)
-    centres[:, 0] = (cols + 0.5) * resolution_m
-    centres[:, 1] = (rows + 0.5) * resolution_m
+    centres[:, 0], centres[:, 1] = cols, rows
+    centres += 0.5
+    centres *= resolution_m
     return centres
 
 

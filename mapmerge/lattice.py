@@ -77,15 +77,17 @@ def box_of(mask: Mask) -> Box:
 def _differing(one: Cells, other: Cells) -> Box:
     """Return the smallest box outside of which two arrays are equal."""
     whole = Box(0, 0, *one.shape)
-    # the largest difference of a band is found several times as fast as where it is
-    bands = [
-        band
-        for band in whole.bands(_BAND_ROWS)
-        if cv2.norm(one[band.slices(whole)], other[band.slices(whole)], cv2.NORM_INF)
-    ]
-    if not bands:
+    bands = list(whole.bands(_BAND_ROWS))
+
+    def differs(band: Box) -> bool:
+        # the largest difference of a band is found several times as fast as where it is
+        return bool(cv2.norm(one[band.slices(whole)], other[band.slices(whole)], cv2.NORM_INF))
+
+    first = next((band for band in bands if differs(band)), None)
+    if first is None:
         return NOTHING
-    rows = Box(bands[0].top, 0, bands[-1].bottom, whole.right)
+    last = next(band for band in reversed(bands) if band == first or differs(band))
+    rows = Box(first.top, 0, last.bottom, whole.right)
     return box_of(one[rows.slices(whole)] != other[rows.slices(whole)]).shifted(rows.top, 0)
 
 

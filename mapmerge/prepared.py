@@ -5,16 +5,19 @@ All of it is in the frame of the map's grid, cropped to what is known: metres fr
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.grid import Counted, Grid, cell_centres_m
+from mapmerge.grid import Grid, cell_centres_m
 from mapmerge.sim2 import Points
 
 CELL_UNKNOWN, CELL_FREE, CELL_OCCUPIED, CELL_UNSURE = 0, 1, 2, 3
 MEETS_FREE, MEETS_WALL, MEETS_NEAR = 1, 2, 4
+
+_BAND_ROWS = 512
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,8 +31,8 @@ class NearestWalls:
         within reach.
     x_m, y_m
         Where these walls are, shape (S,) each, in the order of their numbers. Number 0 is far from everything.
-    directions
-        Which way they run, shape (S, 2), see `PreparedMap.directions`.
+    directed
+        Returns `directions`; called when they are needed, as only searches do.
     cell_m
         Side of a cell: `PreparedMap.wall_spacing_m`, so that each cell holds at most one of these walls.
     corner_m
@@ -39,9 +42,14 @@ class NearestWalls:
     index: NDArray[np.int32]
     x_m: NDArray[np.float32]
     y_m: NDArray[np.float32]
-    directions: NDArray[np.float32]
+    directed: Callable[[], NDArray[np.float32]]
     cell_m: float
     corner_m: tuple[float, float]
+
+    @property
+    def directions(self) -> NDArray[np.float32]:
+        """Which way these walls run, shape (S, 2), see `PreparedMap.directions`."""
+        return self.directed()
 
     def wall_at(self, x_m: NDArray[np.float32], y_m: NDArray[np.float32]) -> NDArray[np.int32]:
         """Return the number of the nearest wall for places of any shape."""
@@ -79,10 +87,8 @@ class PreparedMap:
         Shape as `classes`, uint8: what a point there meets, bits `MEETS_FREE`, `MEETS_WALL` and `MEETS_NEAR`.
     nearest
         The nearest of `walls_m` for each place.
-    wall_cells
-        Rows and columns of all occupied cells, shape (N,) each.
     walls_m
-        The middles of these, thinned to one point per `SearchConfig.wall_spacing_m`, shape (M, 2).
+        The middles of occupied cells, thinned to one point per `SearchConfig.wall_spacing_m`, shape (M, 2).
     numbers
         The number of each of `walls_m` in `nearest`, shape (M,).
     free_m
@@ -98,7 +104,6 @@ class PreparedMap:
     classes: NDArray[np.uint8]
     meets: NDArray[np.uint8]
     nearest: NearestWalls
-    wall_cells: tuple[Counted, Counted]
     walls_m: Points
     numbers: NDArray[np.int32]
     free_m: Points
@@ -113,8 +118,13 @@ class PreparedMap:
 
     @property
     def wall_cells_m(self) -> Points:
-        """Centres of all occupied cells, shape (N, 2)."""
-        return cell_centres_m(*self.wall_cells, self.resolution_m)
+        """Centres of all occupied cells, row by row, shape (N, 2): found anew each time, as they are rarely needed."""
+        parts = []
+        for first in range(0, len(self.classes), _BAND_ROWS):
+            is_wall = self.classes[first : first + _BAND_ROWS] == CELL_OCCUPIED
+            row, col = np.divmod(np.flatnonzero(is_wall), is_wall.shape[1])
+            parts.append(cell_centres_m(row + (first - self.margin), col - self.margin, self.resolution_m))
+        return np.concatenate(parts)
 
     @property
     def directions(self) -> NDArray[np.float32]:

@@ -7,26 +7,22 @@ what is computed anew of the same map.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.grid import Counted, Mask
+from mapmerge.grid import Counted
+from mapmerge.keys import Keys, Places, Whole, box_of_keys, exchanged, keys_of, places_of, span_of_rows
 from mapmerge.plane import NOTHING, Box, Plane
 from mapmerge.sim2 import Points
 
-Whole = NDArray[np.int64]
 Numbers = NDArray[np.int32]
-
-_Item = TypeVar("_Item", bound=np.generic)
 
 NO_WALL = 0
 DIRECTION_SQUARES = 7
 _BAND_SQUARES = 512
-_ROW = 1 << 32
+_SPARE = 8
 _FRACTIONS = 16
 _ROUNDING = 1e-9
 
@@ -43,7 +39,7 @@ class Squares:
     def __init__(self, cells: float) -> None:
         self.cells = cells
 
-    def of(self, cells: Whole) -> Whole:
+    def of(self, cells: Whole | Counted) -> Whole:
         """Return the square in which the middle of each cell lies, along one axis."""
         return np.asarray(np.floor((cells + 0.5) / self.cells + _ROUNDING), np.int64)
 
@@ -76,14 +72,10 @@ class LiveWalls:
 
     Attributes
     ----------
-    cell_rows, cell_cols
-        Row and column of all occupied cells, row by row, shape (N,) each.
     numbers
         Of the thinned walls, row by row of the squares, shape (M,). A wall keeps its number as long as it is there.
     rows, cols
-        Where the wall of each number is, in cells, shape (S,).
-    directions
-        Of the wall of each number: cosine and sine of twice the angle in which it runs, shape (S, 2).
+        Where the wall of each number is, in cells, shape (S,); anywhere if no wall has that number.
     nearest
         For each square the number of the nearest wall; `NO_WALL` if none is within reach.
     """
@@ -91,102 +83,138 @@ class LiveWalls:
     def __init__(self, square_cells: float, reach_squares: float) -> None:
         self.squares = Squares(square_cells)
         self.reach_squares = reach_squares
-        self.cell_rows: Counted = np.empty(0, np.int32)
-        self.cell_cols: Counted = np.empty(0, np.int32)
         self.numbers: Numbers = np.empty(0, np.int32)
         self.rows: NDArray[np.float64] = np.zeros(1)
         self.cols: NDArray[np.float64] = np.zeros(1)
-        self.directions: NDArray[np.float32] = np.zeros((1, 2), np.float32)
         self.nearest = Plane(np.int32)
-        self._keys: Whole = np.empty(0, np.int64)
+        self._keys: Keys = np.empty(0, np.int64)
+        self._counts: NDArray[np.int32] = np.zeros(1, np.int32)
         self._free: Numbers = np.empty(0, np.int32)
+        self._directions: NDArray[np.float32] = np.zeros((1, 2), np.float32)
+        self._undirected = NOTHING
 
     @property
     def margin_squares(self) -> int:
         """How far around what is known the nearest wall is kept."""
         return math.ceil(self.reach_squares) + 1
 
-    def update(self, occupied: Callable[[Box], Mask], covered: Box, changed: Box) -> None:
-        """Take in that a box of cells changed.
+    @property
+    def directions(self) -> NDArray[np.float32]:
+        """Of the wall of each number: cosine and sine of twice the angle in which it runs, shape (S, 2).
+
+        Only a search needs them: they are found when they are asked for, where walls moved since.
+        """
+        for band in self._undirected.bands(_BAND_SQUARES):
+            self._direct(band)
+        # only now: another thread may ask, too, and finds the same
+        self._undirected = NOTHING
+        return self._directions
+
+    def update(self, covered: Box, came: Places, went: Places) -> Numbers:
+        """Take in which cells became occupied, and which are so no more; return the numbers of walls in their squares.
 
         Parameters
         ----------
-        occupied
-            Tells which cells of a box are occupied.
         covered
             All that is known.
-        changed
-            What may differ from before.
+        came, went
+            Rows and columns of these cells, row by row.
         """
-        moved, appeared = NOTHING, NOTHING
-        for band in self.squares.box(changed).bands(_BAND_SQUARES):
-            differing, occupancy = self._renew(occupied, covered, band)
+        moved, appeared, numbers = NOTHING, NOTHING, [np.empty(0, np.int32)]
+        for band in self._touched(came).union(self._touched(went)).bands(_BAND_SQUARES):
+            rows = self.squares.rows_of_cells(band)
+            differing, occupancy, placed = self._renew(_in_rows(came, *rows), _in_rows(went, *rows))
             moved, appeared = moved.union(differing), appeared.union(occupancy)
-        for band in moved.padded(DIRECTION_SQUARES // 2).bands(_BAND_SQUARES):
-            self._direct(band)
+            numbers.append(placed)
+        self._undirected = self._undirected.union(moved.padded(DIRECTION_SQUARES // 2))
         known = self.squares.box(covered).padded(self.margin_squares)
         self.nearest.cover(known)
-        for band in appeared.padded(self.margin_squares).within(known).bands(_BAND_SQUARES):
+        for band in appeared.padded(self._reach).within(known).bands(_BAND_SQUARES):
             self._find_nearest(band)
+        return np.concatenate(numbers)
 
-    def _renew(self, occupied: Callable[[Box], Mask], covered: Box, band: Box) -> tuple[Box, Box]:
-        """Collect the walls of a band of squares; return the boxes of squares whose walls moved, and came or went."""
-        first, last = self.squares.rows_of_cells(band)
-        rows = Box(first, covered.left, last, covered.right).within(covered)
-        cells = np.flatnonzero(np.ascontiguousarray(occupied(rows))).astype(np.int64)
-        row, col = np.divmod(cells, max(1, rows.shape[1]))
-        row, col = row + rows.top, col + rows.left
-        begin, end = np.searchsorted(self.cell_rows, (first, last))
-        self.cell_rows = _spliced(self.cell_rows, begin, end, row.astype(np.int32))
-        self.cell_cols = _spliced(self.cell_cols, begin, end, col.astype(np.int32))
+    @property
+    def _reach(self) -> int:
+        """How many squares away along an axis a wall may be near: no distance is shorter than that along an axis."""
+        return math.floor(self.reach_squares)
 
-        keys, mean_row, mean_col = self._thinned(row, col)
-        begin, end = np.searchsorted(self._keys, (band.top * _ROW - _ROW // 2, band.bottom * _ROW - _ROW // 2))
-        old_keys, old_numbers = self._keys[begin:end], self.numbers[begin:end]
-        known = np.isin(keys, old_keys, assume_unique=True)
-        stays = np.isin(old_keys, keys, assume_unique=True)
-        numbers = np.empty(len(keys), np.int32)
-        numbers[known] = old_numbers[stays]
-        numbers[~known] = self._new_numbers(int(np.count_nonzero(~known)))
-        self._free = np.concatenate([self._free, old_numbers[~stays]])
-        moved = ~known | (self.rows[numbers] != mean_row) | (self.cols[numbers] != mean_col)
-        self.rows[numbers], self.cols[numbers] = mean_row, mean_col
-        self.numbers = _spliced(self.numbers, begin, end, numbers)
-        self._keys = _spliced(self._keys, begin, end, keys)
-        gone = old_keys[~stays]
-        appeared = _box_of_keys(np.concatenate([keys[~known], gone]))
-        return _box_of_keys(np.concatenate([keys[moved], gone])), appeared
+    def _touched(self, cells: Places) -> Box:
+        """Return the box of the squares in which cells lie, one column wide: only its rows matter."""
+        if len(cells[0]) == 0:
+            return NOTHING
+        top, bottom = self.squares.of(cells[0][[0, -1]]).tolist()
+        return Box(top, 0, bottom + 1, 1)
 
-    def _thinned(self, row: Whole, col: Whole) -> tuple[Whole, NDArray[np.float64], NDArray[np.float64]]:
-        """Return the squares of some cells, sorted, and the middle of the cells of each."""
+    def _renew(self, came: Places, went: Places) -> tuple[Box, Box, Numbers]:
+        """Take in cells of some rows of squares.
+
+        Returns the boxes of squares whose walls moved, and came or went, and the numbers of those that are there.
+        """
+        keys, (count, row, col) = self._tallied(came, went)
+        if len(keys) == 0:
+            return NOTHING, NOTHING, np.empty(0, np.int32)
+        place = np.searchsorted(self._keys, keys)
+        numbers = np.full(len(keys), NO_WALL, np.int32)
+        known = np.zeros(len(keys), np.bool_)
+        inside = place < len(self._keys)
+        known[inside] = self._keys[place[inside]] == keys[inside]
+        numbers[known] = self.numbers[place[known]]
+
+        before = self._counts[numbers]
+        count += before
+        stays = count > 0
+        gone, new = known & ~stays, ~known & stays
+        # sums of whole numbers, found again from the means: they do not depend on which cells came when
+        row, col = (
+            (values + np.rint(means[numbers] * before)) / np.maximum(count, 1)
+            for values, means in ((row, self.rows), (col, self.cols))
+        )
+        numbers[new] = self._new_numbers(int(np.count_nonzero(new)))
+        self._free = np.concatenate([self._free, numbers[gone]])
+        moved = gone | new | (stays & ((self.rows[numbers] != row) | (self.cols[numbers] != col)))
+        there = numbers[stays]
+        self._counts[there], self.rows[there], self.cols[there] = count[stays], row[stays], col[stays]
+        change = place[gone], place[new]
+        self.numbers = exchanged(self.numbers, *change, numbers[new])
+        self._keys = exchanged(self._keys, *change, keys[new])
+        return box_of_keys(keys[moved]), box_of_keys(keys[gone | new]), there
+
+    def _tallied(self, came: Places, went: Places) -> tuple[Keys, NDArray[np.float64]]:
+        """Return the squares of some cells, sorted, and by how much the number of cells of each and their sums grow."""
+        row, col = (np.concatenate(both) for both in zip(came, went, strict=True))
         if len(row) == 0:
-            return np.empty(0, np.int64), np.empty(0), np.empty(0)
+            return np.empty(0, np.int64), np.empty((3, 0))
         square_row, square_col = self.squares.of(row), self.squares.of(col)
         top, left = int(square_row.min()), int(square_col.min())
         cols = int(square_col.max()) - left + 1
         member = (square_row - top) * cols + (square_col - left)
-        count = np.bincount(member)
-        filled = np.flatnonzero(count)
-        # sums of whole numbers, so that they do not depend on where counting begins
-        sums = [np.bincount(member, weights=values)[filled] / count[filled] for values in (row, col)]
-        return (filled // cols + top) * _ROW + filled % cols + left, sums[0], sums[1]
+        sign = np.ones(len(row))
+        sign[len(came[0]) :] = -1.0
+        touched = np.flatnonzero(np.bincount(member))
+        sums: NDArray[np.float64] = np.empty((3, len(touched)))
+        for sum_of, values in zip(sums, (sign, sign * row, sign * col), strict=True):
+            sum_of[:] = np.bincount(member, weights=values)[touched]
+        return keys_of(touched // cols + top, touched % cols + left), sums
 
     def _new_numbers(self, count: int) -> Numbers:
         """Return numbers that no wall has, those of walls that are gone first."""
-        reused, self._free = self._free[:count], self._free[count:]
-        first, more = len(self.rows), count - len(reused)
-        if more:
-            self.rows = np.concatenate([self.rows, np.zeros(more)])
-            self.cols = np.concatenate([self.cols, np.zeros(more)])
-            self.directions = np.concatenate([self.directions, np.zeros((more, 2), np.float32)])
-        return np.concatenate([reused, np.arange(first, first + more, dtype=np.int32)])
+        short = count - len(self._free)
+        if short > 0:
+            # more than are needed now, so that the arrays seldom grow
+            first, more = len(self.rows), short + len(self.rows) // _SPARE
+            self._free = np.concatenate([self._free, np.arange(first, first + more, dtype=np.int32)])
+            self.rows, self.cols = (np.concatenate([values, np.zeros(more)]) for values in (self.rows, self.cols))
+            self._counts = np.concatenate([self._counts, np.zeros(more, np.int32)])
+            self._directions = np.concatenate([self._directions, np.zeros((more, 2), np.float32)])
+        numbers, self._free = self._free[:count], self._free[count:]
+        return numbers
 
     def _within(self, box: Box) -> tuple[Whole, Whole, Numbers]:
         """Return row and column of the squares of a box that hold walls, and the numbers of these."""
-        begin, end = np.searchsorted(self._keys, (box.top * _ROW - _ROW // 2, box.bottom * _ROW - _ROW // 2))
-        row, col = _rows_and_cols(self._keys[begin:end])
+        span = span_of_rows(self._keys, box)
+        row, col = places_of(self._keys[span])
         inside = (col >= box.left) & (col < box.right)
-        return row[inside] - box.top, col[inside] - box.left, self.numbers[begin:end][inside]
+        return row[inside] - box.top, col[inside] - box.left, self.numbers[span][inside]
 
     def _direct(self, box: Box) -> None:
         """Find which way each wall of some squares runs, from the spread of the walls around it."""
@@ -208,11 +236,11 @@ class LiveWalls:
         )
         xx, yy, xy = count * sum_xx - sum_x**2, count * sum_yy - sum_y**2, count * sum_xy - sum_x * sum_y
         total = np.maximum(xx + yy, 1.0)
-        self.directions[numbers] = np.stack([(xx - yy) / total, 2 * xy / total], axis=1).astype(np.float32)
+        self._directions[numbers] = np.stack([(xx - yy) / total, 2 * xy / total], axis=1).astype(np.float32)
 
     def _find_nearest(self, box: Box) -> None:
         """Find the wall that is nearest to each square of a box."""
-        around = box.padded(self.margin_squares)
+        around = box.padded(self._reach)
         row, col, numbers = self._within(around)
         target = self.nearest.part(box)
         if len(numbers) == 0:
@@ -226,7 +254,8 @@ class LiveWalls:
         number_of = np.zeros(len(numbers) + 1, np.int32)
         number_of[labels[row, col]] = numbers
         inner = box.slices(around)
-        target[:] = np.where(distance[inner] <= self.reach_squares, number_of[labels[inner]], np.int32(NO_WALL))
+        target[:] = number_of.take(labels[inner].astype(np.intp))
+        target[distance[inner] > self.reach_squares] = NO_WALL
 
 
 def thinned(points_m: Points, spacing_m: float) -> Points:
@@ -243,18 +272,7 @@ def thinned(points_m: Points, spacing_m: float) -> Points:
     return means
 
 
-def _spliced(values: NDArray[_Item], begin: np.intp, end: np.intp, new: NDArray[_Item]) -> NDArray[_Item]:
-    """Return values of which some, from ``begin`` to ``end``, are replaced."""
-    return np.concatenate([values[:begin], new, values[end:]])
-
-
-def _rows_and_cols(keys: Whole) -> tuple[Whole, Whole]:
-    row = (keys + _ROW // 2) // _ROW
-    return row, keys - row * _ROW
-
-
-def _box_of_keys(keys: Whole) -> Box:
-    if len(keys) == 0:
-        return NOTHING
-    row, col = _rows_and_cols(keys)
-    return Box(int(row.min()), int(col.min()), int(row.max()) + 1, int(col.max()) + 1)
+def _in_rows(cells: Places, first: int, last: int) -> Places:
+    """Return the cells of some rows, the last excluded."""
+    begin, end = np.searchsorted(cells[0], (first, last))
+    return cells[0][begin:end], cells[1][begin:end]

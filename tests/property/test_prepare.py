@@ -102,3 +102,40 @@ def test_a_map_on_other_cells_is_prepared_anew(moved):
     live.update(Grid(world(1), 0.05))
     grid = Grid(world(2), 0.05, moved)
     same(live.update(grid), LiveMap(0.05, MergeConfig()).update(grid))
+
+
+@pytest.mark.parametrize("config", CONFIGS)
+def test_free_space_alone_changes(config):
+    cells = world(3)
+    cells[0, 0] = cells[-1, -1] = 0
+    opened, closed = cells.copy(), cells.copy()
+    opened[20:60, 10:70][cells[20:60, 10:70] < 0] = 0
+    closed[5:80, 5:80][cells[5:80, 5:80] == 0] = 50
+    live = LiveMap(0.05, config)
+    for shown in (cells, opened, closed, cells):
+        grid = Grid(shown.copy(), 0.05)
+        same(live.update(grid), LiveMap(0.05, config).update(grid))
+
+
+def test_all_walls_vanish_and_come_back():
+    cells = world(5)
+    cells[0, 0] = cells[-1, -1] = 0
+    live = LiveMap(0.05, MergeConfig())
+    for shown in (cells, np.where(cells == 100, 0, cells), cells, np.where(cells == 100, -1, cells)):
+        shown[0, 0] = shown[-1, -1] = 0
+        grid = Grid(shown.astype(np.int8), 0.05)
+        same(live.update(grid), LiveMap(0.05, MergeConfig()).update(grid))
+
+
+@pytest.mark.parametrize("config", CONFIGS)
+@pytest.mark.parametrize("step", [(0, -30), (-30, 0), (-30, -60), (30, 60), (-10, 20)])
+def test_a_map_grows_to_the_left_or_the_top(config, step):
+    """By whole squares of the first settings, so that nothing is renewed; those of the others are no whole cells."""
+    live, cells = LiveMap(0.05, config), world(7)
+    cells[cells < 0] = 0
+    for top, left in ((60, 60), (60 + min(step[0], 0), 60 + min(step[1], 0)), (60 + step[0], 60 + step[1])):
+        shown = np.tile(cells, (3, 3))[top : top + 100, left : left + 110].copy()
+        grid = Grid(shown, 0.05, Sim2(left * 0.05, top * 0.05))
+        kept, renewed = live.update(grid), live.renewed()
+        assert config is not CONFIGS[0] or renewed is None
+        same(renewed or kept, LiveMap(0.05, config).update(grid))
