@@ -153,27 +153,30 @@ def _points(points_m: Points) -> _Points:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Walls:
-    """`NearestWalls`, flat: the number of the wall nearest to each cell, and both coordinates of each wall as one."""
+    """`NearestWalls`, flat: the number of the wall nearest to each cell, and where each wall is, x + iy, in cells."""
 
     index: NDArray[np.int32]
-    place_m: NDArray[np.complex64]
+    place: NDArray[np.complex64]
     shape: tuple[int, int]
     cell_m: float
-    corner_m: tuple[float, float]
+    corner: complex
 
     @classmethod
     def of(cls, nearest: NearestWalls) -> _Walls:
         rows, cols = nearest.index.shape
-        place_m = (nearest.x_m + 1j * nearest.y_m).astype(np.complex64)
-        return cls(nearest.index.ravel(), place_m, (rows, cols), nearest.cell_m, nearest.corner_m)
+        corner = complex(*nearest.corner_m) / nearest.cell_m
+        place = (nearest.x_m + 1j * nearest.y_m).astype(np.complex64)
+        place *= np.float32(1.0 / nearest.cell_m)
+        place -= np.complex64(corner)
+        return cls(nearest.index.ravel(), place, (rows, cols), nearest.cell_m, corner)
 
     def at(self, col: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.complex64]:
-        """Return the places of the walls nearest to places in cells; these are overwritten."""
+        """Return the places of the walls nearest to some places, all in cells."""
         rows, cols = self.shape
-        cell = np.clip(row, 0, rows - 1, out=row).astype(np.int32)
+        cell = np.clip(row, 0, rows - 1).astype(np.int32)
         cell *= np.int32(cols)
-        cell += np.clip(col, 0, cols - 1, out=col).astype(np.int32)
-        return self.place_m.take(self.index.take(cell))
+        cell += np.clip(col, 0, cols - 1).astype(np.int32)
+        return self.place.take(self.index.take(cell))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -202,22 +205,20 @@ class _Pairs:
 
 def _pairs(walls: _Walls, points: _Points, place: Complex, turn: Complex, reject_m: float) -> _Pairs:
     """Pair each point with its nearest wall, unless that is too far away."""
-    # one product for all placements of all points, in metres and in cells of the look-up
-    in_m = _placing(place, turn)
-    in_cells = in_m / walls.cell_m
-    in_cells[:, :, 2] -= np.array(walls.corner_m)[:, None] / walls.cell_m
-    placing = np.concatenate([in_m, in_cells]).astype(np.float32)
+    # one product for all placements of all points, in cells of the look-up
+    placing = _placing(place / walls.cell_m - walls.corner, turn / walls.cell_m).astype(np.float32)
     shape = len(place), len(points.powers)
-    x, y, col, row = (placing.reshape(-1, 3) @ points.columns).reshape(4, *shape)
-    nearest = walls.at(col, row)
+    col, row = (placing.reshape(-1, 3) @ points.columns).reshape(2, *shape)
+    nearest, reject = walls.at(col, row), reject_m / walls.cell_m
     weighted = np.empty((3, *shape), np.float32)
     weight, error_x, error_y = weighted
-    np.subtract(nearest.real, x, out=error_x)
-    np.subtract(nearest.imag, y, out=error_y)
-    square = error_x * error_x + error_y * error_y
-    is_near = (square <= np.float32(reject_m * reject_m)).astype(np.float32)
+    np.subtract(nearest.real, col, out=error_x)
+    np.subtract(nearest.imag, row, out=error_y)
+    square = error_x * error_x
+    square += error_y * error_y
+    is_near = (square <= np.float32(reject * reject)).astype(np.float32)
     # Cauchy weights: what is far apart says less
-    square *= np.float32(1.0 / (_CAUCHY * reject_m) ** 2)
+    square *= np.float32(1.0 / (_CAUCHY * reject) ** 2)
     square += np.float32(1.0)
     np.divide(is_near, square, out=weight)
     weighted[1:] *= weight
@@ -225,7 +226,8 @@ def _pairs(walls: _Walls, points: _Points, place: Complex, turn: Complex, reject
     enough = is_near @ points.powers[:, 0] >= _MIN_PAIRS
     total = np.where(enough, sums[0, :, 0], 1.0)
     (_, arm_x, arm_y, arm_square), (along_x, xx, yx, _), (along_y, xy, yy, _) = np.moveaxis(sums, 2, 1) / total
-    return _Pairs(enough, arm_x + 1j * arm_y, arm_square, along_x + 1j * along_y, xx + yy + 1j * (xy - yx))
+    error, pull = along_x + 1j * along_y, xx + yy + 1j * (xy - yx)
+    return _Pairs(enough, arm_x + 1j * arm_y, arm_square, walls.cell_m * error, walls.cell_m * pull)
 
 
 def _moved(place: Complex, turn: Complex, pairs: _Pairs, scales: tuple[float, float]) -> tuple[Complex, Complex]:

@@ -68,9 +68,10 @@ class SearchConfig(Settings):
     rotations
         Rotations taken from the correlation of each of the two kinds of spectra; each is tried as it is and turned by
         180°.
-    cell_m
-        Side of the cells of the coarse maps that are correlated; larger where the maps have larger cells, or would
-        need more than `max_side_cells` of them.
+    cell_m, large_cell_m
+        Side of the cells of the coarse maps that are correlated: the second where there would be more than
+        `many_side_cells` of the first a side. Larger where the maps have larger cells, or would need more than
+        `max_side_cells` of them.
     free_weights
         What a wall in the other map's free space costs, against 1 for a wall on a wall: candidates are taken for each
         of these, as maps that are bent ask for a low weight and maps that share little for a high one.
@@ -78,8 +79,8 @@ class SearchConfig(Settings):
         Peaks of the correlation surface that are taken for each rotation.
     peak_distance_m
         Least distance of two peaks of one surface.
-    max_side_cells
-        Most cells a side of the correlated maps.
+    many_side_cells, max_side_cells
+        So many cells a side are many, and the most, of the correlated maps.
     max_candidates
         Candidates of all rotations that are aligned, for each weight.
     sweep_step_rad, sweep_cell_m, sweep_free_weights, sweep_shifts, sweep_candidates
@@ -101,10 +102,12 @@ class SearchConfig(Settings):
     angle_step_rad: float = math.radians(1.0)
     rotations: tuple[int, int] = (4, 3)
     cell_m: float = 0.20
+    large_cell_m: float = 0.30
     free_weights: tuple[float, ...] = (0.5, 1.8)
     shifts: int = 8
     peak_distance_m: float = 0.8
-    max_side_cells: int = 640
+    many_side_cells: int = 640
+    max_side_cells: int = 1000
     max_candidates: int = 40
     sweep_step_rad: float = math.radians(2.5)
     sweep_cell_m: float = 0.25

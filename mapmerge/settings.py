@@ -24,6 +24,7 @@ _DIVISORS = {
     "radon_bin_m",
     "inlier_m",
     "icp_reject_m",
+    "many_side_cells",
     "max_side_cells",
 }
 

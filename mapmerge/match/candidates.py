@@ -12,7 +12,7 @@ from mapmerge.align import Poses, poses_of
 from mapmerge.config import SearchConfig
 from mapmerge.match.pair import PairOfMaps
 from mapmerge.match.spectrum import rotation_peaks, spectrum_correlation
-from mapmerge.match.surface import TranslationSearch, surface_peaks
+from mapmerge.match.surface import CoarseCells, TranslationSearch, surface_peaks
 from mapmerge.prior import WITHIN_SIGMAS
 from mapmerge.sim2 import Sim2
 
@@ -93,7 +93,8 @@ def _correlated(
     most: int,
     config: SearchConfig,
 ) -> Poses:
-    search = TranslationSearch(pair.target.map, pair.source.map, cell_m, config.max_side_cells, free_weights, turns)
+    cells = CoarseCells.of(config, cell_m)
+    search = TranslationSearch(pair.target.map, pair.source.map, cells, free_weights, turns)
     found: list[list[tuple[Poses, NDArray[np.float32]]]] = [[] for _ in free_weights]
     for turn in turns:
         for number, surface in enumerate(search.surfaces(turn)):

@@ -11,7 +11,7 @@ from mapmerge.match.base import Match
 from mapmerge.match.candidates import likely_rotations
 from mapmerge.match.pair import PairOfMaps
 from mapmerge.match.spectrum import spectrum_correlation
-from mapmerge.match.surface import TranslationSearch
+from mapmerge.match.surface import CoarseCells, TranslationSearch
 from mapmerge.sim2 import Sim2, wrap_angle
 
 _SAME_TURN_RAD = 0.1
@@ -61,8 +61,7 @@ def _surface(pair: PairOfMaps, best: Sim2, rivals: list[Sim2], config: SearchCon
     translations = TranslationSearch(
         pair.target.map,
         pair.source.map,
-        config.cell_m,
-        config.max_side_cells,
+        CoarseCells.of(config, config.cell_m),
         config.free_weights[-1:],
         [turn],
     )

@@ -18,7 +18,7 @@ from mapmerge.sim2 import Points
 Spectrum = NDArray[np.float64]
 Spectra = NDArray[np.float64]
 
-_AT_ONCE = 1 << 15
+_AT_ONCE = 1 << 14
 _ENOUGH_WALLS = 5_000
 
 
@@ -74,7 +74,7 @@ def _energies(axes: Points, columns: Points, reach: float, bins: int) -> Spectra
     counts = np.bincount(place.astype(np.intp).ravel(), minlength=bins * len(axes)).reshape(len(axes), bins)
     # neighbouring bins are summed so that a wall on the border of two bins counts in full
     square = np.square(counts[:, :-1] + counts[:, 1:], dtype=np.float64)
-    return np.stack([np.square(square).sum(axis=1), square.sum(axis=1)])
+    return np.stack([np.einsum("ab,ab->a", square, square), square.sum(axis=1)])
 
 
 def spectrum_correlation(target: Spectrum, source: Spectrum) -> Spectrum:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmerge.align import Poses
+from mapmerge.config import SearchConfig
 from mapmerge.prepared import PreparedMap
 from mapmerge.sim2 import Points, Sim2
 
@@ -56,6 +57,34 @@ class CorrelationSurface:
         return row, round((target_from_source.x_m - self.origin_m[0]) / self.step_m)
 
 
+@dataclass(frozen=True, slots=True)
+class CoarseCells:
+    """How large the cells of the coarse maps are, see `SearchConfig.cell_m`.
+
+    Parameters
+    ----------
+    cell_m, large_cell_m
+        Side of a cell, and where there would be many of them.
+    many_side_cells, max_side_cells
+        So many a side are many, and the most.
+    """
+
+    cell_m: float
+    large_cell_m: float
+    many_side_cells: int
+    max_side_cells: int
+
+    @classmethod
+    def of(cls, config: SearchConfig, cell_m: float) -> CoarseCells:
+        """Return what the settings say, for cells of this side where there are not many."""
+        return cls(cell_m, config.large_cell_m, config.many_side_cells, config.max_side_cells)
+
+    def side_m(self, extent_m: float, least_m: float) -> float:
+        """Return the side of the cells of a coarse map that is so large, of maps whose own cells are not smaller."""
+        larger_m = min(self.large_cell_m, extent_m / self.many_side_cells)
+        return max(self.cell_m, least_m, larger_m, extent_m / self.max_side_cells)
+
+
 class TranslationSearch:
     """Correlates one target map with turned sources: the target's transforms are computed once.
 
@@ -63,11 +92,8 @@ class TranslationSearch:
     ----------
     target, source
         The maps.
-    cell_m
-        Side of the cells of the coarse maps; larger where the target has larger cells, or would need more than
-        ``max_side_cells`` of them.
-    max_side_cells
-        Most cells a side.
+    cells
+        How large the cells of the coarse maps are.
     free_weights
         What a wall of either map in the other's free space costs, against 1 for a wall on a wall: there is a surface
         for each of these.
@@ -80,8 +106,7 @@ class TranslationSearch:
         self,
         target: PreparedMap,
         source: PreparedMap,
-        cell_m: float,
-        max_side_cells: int,
+        cells: CoarseCells,
         free_weights: tuple[float, ...],
         turns: Sequence[Sim2],
     ) -> None:
@@ -89,7 +114,7 @@ class TranslationSearch:
         self._wall_spacing_m = source.wall_spacing_m
         spans_m = _spans_m(self._columns_m, turns)
         sides_m = [side_m + span_m for side_m, span_m in zip(target.extent_m, spans_m, strict=True)]
-        self._cell_m = max(cell_m, target.resolution_m, max(sides_m) / max_side_cells)
+        self._cell_m = cells.side_m(max(sides_m), target.resolution_m)
         cols, rows = (math.ceil(side_m / self._cell_m) + 4 for side_m in sides_m)
         self._shape = (_transformed_size(rows), _transformed_size(cols))
         # shifts are cyclic: no source meets the target further up than at its last cell, so that what lies beyond is

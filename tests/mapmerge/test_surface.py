@@ -7,7 +7,7 @@ import pytest
 
 from mapmerge.config import SearchConfig
 from mapmerge.grid import Grid
-from mapmerge.match.surface import TranslationSearch, surface_peaks
+from mapmerge.match.surface import CoarseCells, TranslationSearch, surface_peaks
 from mapmerge.sim2 import IDENTITY, Sim2
 from tests.floors import errors, filled, flat, hall_and_part, prepared_map
 
@@ -18,7 +18,8 @@ PARTS = [(1.0, 1.0), (1.0, 29.0), (44.0, 2.0), (45.0, 28.0)]
 
 
 def searched(target, source, turn=IDENTITY, most=SEARCH.max_side_cells):
-    return TranslationSearch(target, source, SEARCH.cell_m, most, WEIGHTS, [turn])
+    cells = CoarseCells(SEARCH.cell_m, SEARCH.large_cell_m, SEARCH.many_side_cells, most)
+    return TranslationSearch(target, source, cells, WEIGHTS, [turn])
 
 
 def surfaces(target, source, yaw_rad=0.0, scale=1.0):
@@ -102,7 +103,9 @@ class TestShift:
         target, source = prepared_map(flat(ragged=1)), prepared_map(flat(Sim2(-1.0, -1.0, 0.4), ragged=2))
         turns = [Sim2(yaw_rad=yaw_rad) for yaw_rad in (0.4, 1.0, 2.7)]
         for turn in turns:
-            together = TranslationSearch(target, source, 0.2, 1500, WEIGHTS, turns).surfaces(turn)
+            together = TranslationSearch(target, source, CoarseCells(0.2, 0.2, 1500, 1500), WEIGHTS, turns).surfaces(
+                turn
+            )
             for one, alone in zip(together, searched(target, source, turn).surfaces(turn), strict=True):
                 poses, values = peaks(alone)
                 for pose, value in zip(poses[:5], values[:5], strict=True):
@@ -167,3 +170,20 @@ class TestPeaks:
                 poses, values = peaks(surface)
                 assert poses.shape == (len(values), 4)
                 assert np.isfinite(poses).all()
+
+
+class TestCoarseCells:
+    CELLS = CoarseCells(cell_m=0.2, large_cell_m=0.3, many_side_cells=600, max_side_cells=1000)
+
+    @pytest.mark.parametrize(
+        ("extent_m", "least_m", "side_m"),
+        [
+            pytest.param(50.0, 0.05, 0.2, id="small"),
+            pytest.param(50.0, 0.5, 0.5, id="small, of large cells"),
+            pytest.param(150.0, 0.05, 0.25, id="between"),
+            pytest.param(250.0, 0.05, 0.3, id="large"),
+            pytest.param(500.0, 0.05, 0.5, id="too large"),
+        ],
+    )
+    def test_are_larger_where_there_are_many(self, extent_m, least_m, side_m):
+        assert self.CELLS.side_m(extent_m, least_m) == pytest.approx(side_m)
