@@ -104,14 +104,17 @@ class Grid:
         """Area of the known cells."""
         return int(np.count_nonzero(self.cells >= 0)) * self.resolution_m**2
 
-    def same_as(self, other: Grid) -> bool:
-        """Tell whether both grids say the same of the same place."""
+    def covers_as(self, other: Grid) -> bool:
+        """Tell whether both grids have the very same cells, whatever these say."""
         return (
             self.resolution_m == other.resolution_m
             and self.map_from_grid == other.map_from_grid
             and self.cells.shape == other.cells.shape
-            and bool(np.array_equal(self.cells, other.cells))
         )
+
+    def same_as(self, other: Grid) -> bool:
+        """Tell whether both grids say the same of the same place."""
+        return self.covers_as(other) and bool(np.array_equal(self.cells, other.cells))
 
     def centres_m(self, mask: Mask) -> Points:
         """Return the centres of the chosen cells in the map frame, shape (N, 2), row by row."""

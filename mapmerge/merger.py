@@ -171,12 +171,12 @@ class Merger:
 
     def _arrival(self, robot: str, grid: Grid) -> _Arrival | None:
         """Return a map that came, or None if it says what was known already."""
-        known, before = grid.cropped_to_known(), self._maps.get(robot)
+        known, before, last = grid.cropped_to_known(), self._maps.get(robot), self.result.grids.get(robot)
         if before is None:
-            is_first = robot not in self.result.grids or known.cells.size > 0
-            return _Arrival(grid, known, None) if is_first else None
+            return _Arrival(grid, known, None) if last is None or known.cells.size else None
         changed = changed_box(before, known)
-        return None if changed is not None and changed.is_empty else _Arrival(grid, known, changed)
+        says_the_same = changed is not None and changed.is_empty
+        return None if says_the_same and last is not None and grid.covers_as(last) else _Arrival(grid, known, changed)
 
     def _take(self, new: Mapping[str, _Arrival]) -> dict[str, Reason]:
         """Take in maps that are new; return whose map jumped."""
