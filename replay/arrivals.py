@@ -16,8 +16,9 @@ from replay.assemble import assemble
 from replay.clocks import stamp_ns
 from replay.codec import decode, decode_transforms
 from replay.errors import BadMessage
-from replay.events import Clock, SkipCause, Skipped
+from replay.events import Clock, Skipped
 from replay.messages import GridMessage, TransformMessage, UpdateMessage
+from replay.skip_cause import SkipCause
 from replay.sources.base import TF_TYPES, RawMessage, Source
 
 Content = GridMessage | UpdateMessage | TransformMessage | Skipped
@@ -64,11 +65,13 @@ class Tally:
 
     messages: int = 0
     late: int = 0
+    until_ns: int | None = None
     digest: hashlib._Hash = field(default_factory=hashlib.sha256)
 
     def count(self, raw: RawMessage) -> None:
         """Take a message that is used into the count and the digest."""
         self.messages += 1
+        self.until_ns = raw.log_time_ns
         self.digest.update(f"{raw.topic} {raw.log_time_ns} {len(raw.data)}\n".encode())
         self.digest.update(raw.data)
 
@@ -85,7 +88,7 @@ class Arrival:
     @property
     def robot(self) -> str:
         """Whose map it is; "" if it is none."""
-        return self.feed.robot_of[self.raw.topic]
+        return self.feed.robot_of.get(self.raw.topic, "")
 
     def skipped(self, error: BadMessage) -> Skipped:
         """Return why the message, or a part of it, is not used after all."""
@@ -119,6 +122,7 @@ def _stamped(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
     times = _Times(feed, tally)
     before = _Before()
     for raw in feed.source.messages(tuple(feed.robot_of)):
+        yield from _lost(feed, raw.log_time_ns, times.newest_ns)
         content = _decoded(feed, raw)
         time_ns = times.of(raw, content)
         early = window.start_ns is not None and time_ns < window.start_ns
@@ -132,6 +136,16 @@ def _stamped(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
         tally.count(raw)
         yield Arrival(time_ns, feed, raw, content)
     yield from before.release(window.start_ns)
+    yield from _lost(feed, tally.until_ns or 0, times.newest_ns)
+
+
+def _lost(feed: Feed, log_time_ns: int, time_ns: int) -> Iterator[Arrival]:
+    """Yield what of a recording turned out to be lost since this was asked last."""
+    for loss in feed.source.losses.new():
+        raw = RawMessage(loss.topic, "", "cdr", log_time_ns, b"")
+        robot, name = feed.robot_of.get(loss.topic, ""), feed.source.path.name
+        lost = Skipped(robot, loss.topic, log_time_ns, loss.cause, loss.detail, name, loss.place, loss.messages)
+        yield Arrival(time_ns, feed, raw, lost)
 
 
 def _decoded(feed: Feed, raw: RawMessage) -> Content:
@@ -152,7 +166,7 @@ class _Times:
         self._feed = feed
         self._tally = tally
         self._leads_ns: dict[str, int] = {}
-        self._newest_ns = feed.untimed_ns
+        self.newest_ns = feed.untimed_ns
 
     def of(self, raw: RawMessage, content: Content) -> int:
         """Return the time of a message."""
@@ -166,14 +180,14 @@ class _Times:
         else:
             time_ns = max(0, stamp_ns(clock, raw, content) + self._feed.offsets_ns[raw.topic])
             self._leads_ns[raw.topic] = time_ns - raw.log_time_ns
-        self._newest_ns = max(self._newest_ns, time_ns)
+        self.newest_ns = max(self.newest_ns, time_ns)
         return time_ns
 
     def _guessed(self, raw: RawMessage) -> int:
         if raw.topic in self._leads_ns:
             return max(0, raw.log_time_ns + self._leads_ns[raw.topic])
         self._tally.late += 1
-        return self._newest_ns
+        return self.newest_ns
 
 
 class _Before:

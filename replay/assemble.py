@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from mapmerge.grid import Grid
 from replay.errors import BadMessage
-from replay.events import SkipCause
 from replay.messages import GridMessage, UpdateMessage
+from replay.skip_cause import SkipCause
 
 
 def assemble(last: Grid | None, message: GridMessage | UpdateMessage) -> Grid:

@@ -37,7 +37,7 @@ class BadMessage(InputError):
     Parameters
     ----------
     cause
-        A key of the documented list in `replay.events.SkipCause`.
+        A key of the documented list in `replay.skip_cause.SkipCause`.
     detail
         What was found and what was expected.
     """

@@ -4,37 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Any, Literal
 
 from mapmerge.merger import MergeResult
 from mapmerge.render import Picture
+from replay.skip_cause import SkipCause
 
 Report = Mapping[str, Any]
 Clock = Literal["header", "log", "none"]
-
-
-class SkipCause(StrEnum):
-    """Why a message was not used: a closed list."""
-
-    UNDECODABLE = "undecodable"
-    """Its bytes are not those of its type."""
-    SIZE_MISMATCH = "size_mismatch"
-    """Its data does not have width × height cells."""
-    BAD_RESOLUTION = "bad_resolution"
-    """Its resolution is zero, negative or not a number."""
-    BAD_ORIGIN = "bad_origin"
-    """Its origin is not finite, or not a pose in the plane."""
-    TOO_LARGE = "too_large"
-    """A side has more than 100 000 cells."""
-    EMPTY = "empty"
-    """It has no cells."""
-    UPDATE_BEFORE_GRID = "update_before_grid"
-    """An update of a part, before any full map."""
-    UPDATE_OUTSIDE_GRID = "update_outside_grid"
-    """An update of a part that is not within the last full map."""
-    BAD_TRANSFORM = "bad_transform"
-    """A transform in it has no finite shift, no rotation, or not two frames; the others in it are used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,14 +53,22 @@ class Started:
 
 @dataclass(frozen=True, slots=True)
 class Skipped:
-    """A message could not be used, or not all of it.
+    """A message could not be used, or not all of it; or a part of a recording could not.
 
     Parameters
     ----------
     robot
-        Whose it is; "" for transforms, which are no robot's own.
+        Whose it is; "" for transforms, which are no robot's own, and for a part of a recording.
+    topic
+        Its topic; "" if that cannot be told, as of a part of a recording.
+    log_time_ns
+        When it was recorded; of a part of a recording, when what was read last was.
     input
         Name of the file or folder that it came from.
+    place
+        Where the part is in the recording; "" for a message, which its topic and time tell.
+    messages
+        How many messages are lost; None if that cannot be told.
     """
 
     robot: str
@@ -92,6 +77,13 @@ class Skipped:
     cause: SkipCause
     detail: str
     input: str
+    place: str = ""
+    messages: int | None = 1
+
+    @property
+    def where(self) -> str:
+        """Where it was, in words, without the input."""
+        return self.place or f"{self.topic} at {self.log_time_ns} ns"
 
 
 @dataclass(frozen=True, slots=True)

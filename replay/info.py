@@ -14,7 +14,8 @@ from replay.options import RunOptions
 from replay.plan import open_plan
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
-from replay.words import counted, intention, unused
+from replay.sources.losses import Loss
+from replay.words import counted, intention, lost, unused
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +55,7 @@ class InputSummary:
     duration_s: float | None
     messages: int
     topics: tuple[TopicSummary, ...]
+    losses: tuple[Loss, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,12 +101,15 @@ def summarise(options: RunOptions) -> RunSummary:
 
 def _input(source: Source) -> InputSummary:
     info = source.info
+    maps = [topic.name for topic in info.topics if topic.msgtype in (GRID_TYPE, UPDATE_TYPE)]
     return InputSummary(
         path=source.path,
         format=info.format,
         duration_s=_duration_s(info),
         messages=sum(topic.message_count for topic in info.topics),
-        topics=tuple(_topic(source, topic.name) for topic in info.topics if topic.msgtype in (GRID_TYPE, UPDATE_TYPE)),
+        topics=tuple(_topic(source, name) for name in maps),
+        # after the topics were read
+        losses=source.losses.all,
     )
 
 
@@ -149,6 +154,7 @@ def lines(summary: RunSummary) -> Iterator[str]:
         duration = f"{item.duration_s:.1f} s" if item.duration_s is not None else "no clock"
         yield f"{item.path}: {item.format}, {duration}, {counted(item.messages, 'message')}"
         yield from _columns([_row(topic) for topic in item.topics])
+        yield from (f"  {lost(loss.messages)} ({loss.place}): {loss.cause}: {loss.detail}" for loss in item.losses)
     if summary.problem is not None:
         yield f"nothing would be merged: {summary.problem}"
         return

@@ -81,6 +81,7 @@ class Plan:
                 "clocks": dict(sorted(feed.clocks.items())),
                 "offsets_ns": dict(sorted(feed.offsets_ns.items())),
                 **_read(tally),
+                "until_ns": tally.until_ns if tally else None,
                 "late": tally.late if tally else None,
                 "transforms": {
                     topic: _read(taken)

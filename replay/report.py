@@ -46,6 +46,7 @@ class ReportBuilder:
         self._version = version
         self._updates: Counter[str] = Counter()
         self._skipped: Counter[str] = Counter()
+        self._places: dict[tuple[str, str, str, str], Json] = {}
         self._first_merged_ns: dict[str, int] = {}
         self._history: list[Json] = []
         self._notes: list[Json] = []
@@ -53,8 +54,23 @@ class ReportBuilder:
         self._searched: dict[Pair, Json] = {}
 
     def skip(self, event: Skipped) -> None:
-        """Count a message that was not used."""
-        self._skipped[event.cause] += 1
+        """Count a message, or a part of a recording, that was not used."""
+        self._skipped[event.cause] += _at_least(event)
+        key = str(event.cause), event.input, event.topic, event.place
+        there = self._places.setdefault(
+            key,
+            {
+                "cause": key[0],
+                "input": event.input,
+                "topic": event.topic,
+                "place": event.place,
+                "messages": 0,
+                "first_log_time_ns": event.log_time_ns,
+                "detail": event.detail,
+            },
+        )
+        known = there["messages"] is not None and event.messages is not None
+        there["messages"] = there["messages"] + event.messages if known else None
 
     def note(self, event: Noted) -> None:
         """Keep what a reader should know."""
@@ -95,6 +111,7 @@ class ReportBuilder:
             "notes": list(self._notes),
             "updates": self._updates.total(),
             "skipped": dict(sorted(self._skipped.items())),
+            "skipped_at": [dict(item) for item in self._places.values()],
             "inputs": [dict(item) for item in inputs],
             "settings": dict(self._settings),
         }
@@ -116,6 +133,11 @@ class ReportBuilder:
             "first_merged_stamp_ns": self._first_merged_ns.get(item.robot),
             "updates": self._updates[item.robot],
         }
+
+
+def _at_least(event: Skipped) -> int:
+    """Return how many messages were lost, at least one."""
+    return max(1, event.messages or 0)
 
 
 def _reason(reason: Reason) -> Json:

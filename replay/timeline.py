@@ -11,8 +11,9 @@ from mapmerge.grid import Grid
 from replay.arrivals import Arrival, Feed, Tally, Window, in_order
 from replay.assemble import assemble
 from replay.errors import BadMessage, InputError
-from replay.events import SkipCause, Skipped
+from replay.events import Skipped
 from replay.messages import FrameLink, TransformMessage
+from replay.skip_cause import SkipCause
 from replay.sources.base import Source
 
 _MOST_HELD = 1000
@@ -95,8 +96,7 @@ def _items(
             for item in _taken(arrival, latest, changed):
                 if strict and isinstance(item, Skipped):
                     raise InputError(
-                        f"{item.input}: {item.topic} at {item.log_time_ns} ns: {item.detail}; "
-                        "without --strict it would be skipped and counted"
+                        f"{item.input}: {item.where}: {item.detail}; without --strict it would be skipped and counted"
                     )
                 yield item
             messages += arrival.robot != ""

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 def counted(number: int, what: str) -> str:
@@ -21,3 +24,22 @@ def intention(robots: Sequence[str], form: str) -> str:
 def unused(topics: Sequence[str]) -> str:
     """Return which map topics are left out, and how to use one."""
     return f"not used: {', '.join(topics)}; to use one, say whose it is, as --topic r1={topics[0]}"
+
+
+def lost(messages: int | None) -> str:
+    """Return how many messages are lost, if that is known."""
+    return "lost messages" if messages is None else f"lost {counted(messages, 'message')}"
+
+
+def recovered(name: str, messages: int, until_ns: int | None) -> str:
+    """Return what was read of a recording that ends early."""
+    until = f" up to {moment(until_ns)}" if until_ns is not None else ""
+    return f"{name}: recovered {counted(messages, 'message')}{until}; the file ends early"
+
+
+def moment(time_ns: int) -> str:
+    """Return a time in words; as a number where no calendar has it."""
+    try:
+        return f"{_EPOCH + timedelta(microseconds=time_ns // 1000):%Y-%m-%d %H:%M:%S.%f}"[:-3] + " UTC"
+    except OverflowError:
+        return f"{time_ns} ns"

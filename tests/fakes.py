@@ -7,6 +7,7 @@ from pathlib import Path
 
 from replay.sources.base import GRID_TYPE, RawMessage, SourceInfo, TopicInfo
 from replay.sources.boundary import Closing
+from replay.sources.losses import Losses
 from tests.bags import Recorded, as_cdr
 
 
@@ -15,6 +16,7 @@ class FakeSource(Closing):
 
     def __init__(self, messages: Sequence[Recorded], *, has_clock: bool = True) -> None:
         self.path = Path("fake")
+        self.losses = Losses()
         self._messages = messages
         self._has_clock = has_clock
 

@@ -11,6 +11,7 @@ from mapmerge.merger import MergeResult
 from mapmerge.outcome import Change, ChangeKind
 from mapmerge.sim2 import Sim2
 from replay.events import Noted, Report, Skipped
+from replay.words import lost
 
 INFO, WARN = "INFO", "WARN"
 Entry = tuple[str, str]
@@ -26,7 +27,9 @@ def decisions(result: MergeResult) -> Iterator[Entry]:
 
 
 def skipped(event: Skipped) -> Entry:
-    """Say which message was not used, and why."""
+    """Say which message, or part of a recording, was not used, and why."""
+    if event.place:
+        return WARN, f"{event.input}: {lost(event.messages)} ({event.place}): {event.detail}"
     whose = f"{event.robot}: " if event.robot else ""
     return WARN, f"{whose}a message of {event.topic} was skipped: {event.detail}"
 

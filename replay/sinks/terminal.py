@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from replay.events import Event, Merged, Noted, Report, Skipped, Started
-from replay.words import counted, intention, unused
+from replay.words import counted, intention, lost, recovered, unused
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -100,11 +100,14 @@ class Narrator:
         """Name the first few of each cause; `sum_up` counts them all."""
         self._skipped[event.cause] += 1
         if self._skipped[event.cause] <= _SKIPPED_NAMED:
-            where = f"{event.input}, {event.topic}, {event.log_time_ns} ns"
-            self._say(f"skipped a message ({where}): {event.cause}: {event.detail}")
+            what = "skipped a message" if event.messages == 1 else lost(event.messages)
+            self._say(f"{what} ({event.input}, {event.where}): {event.cause}: {event.detail}")
 
     def sum_up(self, report: Report, paths: Sequence[str]) -> None:
         """Say what was skipped, how long it took, and what was written."""
+        for item in report["inputs"]:
+            if any(each["cause"] == "ends_early" and each["input"] == item["name"] for each in report["skipped_at"]):
+                self._say(recovered(item["name"], item["messages"], item["until_ns"]))
         skipped, late = sum(report["skipped"].values()), sum(item["late"] for item in report["inputs"])
         if skipped:
             causes = ", ".join(f"{count} {cause}" for cause, count in report["skipped"].items())

@@ -8,6 +8,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Literal, Protocol, Self
 
+from replay.sources.losses import Losses
+
 Encoding = Literal["cdr", "ros1"]
 
 GRID_TYPE = "nav_msgs/msg/OccupancyGrid"
@@ -61,10 +63,12 @@ class SourceInfo:
 class Source(Protocol):
     """One recording, opened for reading. It is never changed.
 
-    All errors of the libraries below leave as `replay.errors.InputError`.
+    All errors of the libraries below leave as `replay.errors.InputError`. What is damaged is left out, and named in
+    `losses`; only what cannot be read at all is an error.
     """
 
     path: Path
+    losses: Losses
 
     @property
     def info(self) -> SourceInfo:

@@ -22,6 +22,7 @@ from replay.codec import encode_grid
 from replay.errors import InputError
 from replay.sources.base import GRID_TYPE, RawMessage, SourceInfo, TopicInfo
 from replay.sources.boundary import COMMON, Closing, translated
+from replay.sources.losses import Losses
 from replay.sources.map_image import Mode, Pixels, Thresholds, cells_from_pixels
 
 TOPIC = "/map"
@@ -60,6 +61,7 @@ class SavedMap(Closing):
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.losses = Losses()
         with translated(path, _foreign()):
             self._description = _description(path)
 

@@ -11,6 +11,7 @@ from replay.errors import InputError
 from replay.sources.base import RawMessage, SourceInfo
 from replay.sources.boundary import TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
+from replay.sources.losses import Losses
 from replay.sources.mcap_index import NO_CHUNK, Entry, Scan, indexed_entries, read_summary, scan
 from replay.sources.mcap_records import (
     MAGIC,
@@ -47,6 +48,7 @@ class McapFile(Closing):
 
     def __init__(self, path: Path, copy_of: Path | None = None, map_scan: Scan | None = None) -> None:
         self.path = copy_of or path
+        self.losses = Losses()
         with ExitStack() as stack, translated(self.path, foreign_errors()):
             file = stack.enter_context(path.open("rb"))
             if file.read(len(MAGIC)) != MAGIC:

@@ -13,6 +13,7 @@ from replay.errors import InputError
 from replay.sources.base import RawMessage, SourceInfo
 from replay.sources.boundary import COMMON, TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
+from replay.sources.losses import Losses
 from replay.sources.topics import topic_table
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ class Rosbag1File(Closing):
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.losses = Losses()
         with ExitStack() as stack, translated(path, _foreign()):
             self._file = stack.enter_context(path.open("rb"))
             _check_header(path, self._file)

@@ -14,6 +14,7 @@ from typing import Any, Protocol
 from replay.errors import InputError
 from replay.sources.base import RawMessage, Source, SourceInfo
 from replay.sources.boundary import COMMON, Closing, translated
+from replay.sources.losses import Losses
 from replay.sources.mcap_file import McapFile
 from replay.sources.mcap_index import Scan
 from replay.sources.sqlite3_file import Sqlite3File
@@ -45,6 +46,7 @@ class Rosbag2Folder(Closing):
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.losses = Losses()
         with translated(path, _foreign()):
             listed = _listed_parts(path) if (path / METADATA).exists() else []
             self._parts = [_FilePart(part) for part in listed or _parts_in(path)]

@@ -17,6 +17,7 @@ from shlex import quote
 from replay.errors import InputError
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, RawMessage, SourceInfo
 from replay.sources.boundary import COMMON, Closing, translated
+from replay.sources.losses import Losses
 from replay.sources.topics import topic_table, type_in
 from replay.sources.zstd import ZstdError, decompressed_cdr
 
@@ -52,6 +53,7 @@ class Sqlite3File(Closing):
 
     def __init__(self, path: Path, copy_of: Path | None = None) -> None:
         self.path = copy_of or path
+        self.losses = Losses()
         with ExitStack() as stack, translated(self.path, _FOREIGN):
             _check_whole(path.resolve(), self.path)
             # Immutable, so that not even a lock file is left beside the recording.

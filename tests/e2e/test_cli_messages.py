@@ -10,7 +10,7 @@ import pytest
 
 from mapmerge.grid import Grid
 from mapmerge.sim2 import Sim2
-from replay.events import SkipCause
+from replay.skip_cause import SkipCause
 from tests.bags import write_mcap, write_rosbag1, write_rosbag2
 from tests.outputs import maps, raw, reports, same_map, transforms
 from tests.program import Program

@@ -11,7 +11,7 @@ import pytest
 
 from mapmerge.outcome import ChangeKind, Status
 from mapmerge.reasons import ReasonCode
-from replay.events import SkipCause
+from replay.skip_cause import SkipCause
 from tests.data_paths import ROOT
 
 SCHEMA = json.loads(resources.files("replay").joinpath("schemas/report.schema.json").read_text("utf-8"))

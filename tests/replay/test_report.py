@@ -18,8 +18,9 @@ from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
 from replay.errors import BadMessage
-from replay.events import Noted, Report, RobotInput, SkipCause, Skipped
+from replay.events import Noted, Report, RobotInput, Skipped
 from replay.report import ReportBuilder
+from replay.skip_cause import SkipCause
 from tests.runs import bare_room, begun_anew, flat_map, is_right, reference_from
 
 ROBOTS = ("r1", "r2", "r3")
@@ -31,6 +32,7 @@ INPUT: Mapping[str, Any] = {
     "clocks": dict.fromkeys(ROBOTS, "header"),
     "offsets_ns": dict.fromkeys(ROBOTS, 0),
     "messages": None,
+    "until_ns": None,
     "late": None,
     "sha256": None,
     "transforms": {},
@@ -136,6 +138,23 @@ def test_skipped_messages_are_counted_by_cause() -> None:
     found = report.build(None, Merger(ROBOTS).result, [INPUT])
     validate(found)
     assert list(found["skipped"].items()) == [("bad_origin", 1), ("empty", 2)]
+
+
+def test_what_is_lost_is_counted_by_place() -> None:
+    report = builder()
+    for messages in (3, None):
+        lost = Skipped("", "", 5, SkipCause.DAMAGED, "detail", "run.mcap", f"the chunk at byte {messages}", messages)
+        report.skip(lost)
+    report.skip(Skipped("r1", "/r1/map", 7, SkipCause.EMPTY, "no cell", "run.mcap"))
+    report.skip(Skipped("r1", "/r1/map", 9, SkipCause.EMPTY, "no cell, either", "run.mcap"))
+    found = report.build(None, Merger(ROBOTS).result, [INPUT])
+    validate(found)
+    assert found["skipped"] == {"damaged": 4, "empty": 2}
+    assert [(item["place"], item["messages"], item["detail"]) for item in found["skipped_at"]] == [
+        ("the chunk at byte 3", 3, "detail"),
+        ("the chunk at byte None", None, "detail"),
+        ("", 2, "no cell"),
+    ]
 
 
 def test_what_was_believed() -> None:

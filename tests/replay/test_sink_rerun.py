@@ -22,7 +22,7 @@ from mapmerge.merger import Merger
 from mapmerge.outcome import Status
 from mapmerge.sim2 import IDENTITY, Sim2
 from replay.errors import OutputError
-from replay.events import Event, Finished, Merged, Noted, RobotInput, SkipCause, Skipped, Started, Timing
+from replay.events import Event, Finished, Merged, Noted, RobotInput, Skipped, Started, Timing
 from replay.gallery import Gallery
 from replay.options import OutputOptions, RunOptions
 from replay.report import ReportBuilder
@@ -30,6 +30,7 @@ from replay.sinks.rerun_file import RerunSink
 from replay.sinks.rerun_layout import Box, lay_out
 from replay.sinks.rerun_maps import MAX_SIDE_CELLS
 from replay.sinks.rerun_stream import RrdStream
+from replay.skip_cause import SkipCause
 from tests.floors import filled
 from tests.runs import bare_room, flat_map, reference_from
 

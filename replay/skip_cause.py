@@ -1,0 +1,42 @@
+"""Why something of a recording was not used."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class SkipCause(StrEnum):
+    """Why a message was not used: a closed list."""
+
+    UNDECODABLE = "undecodable"
+    """Its bytes are not those of its type."""
+    SIZE_MISMATCH = "size_mismatch"
+    """Its data does not have width × height cells."""
+    BAD_RESOLUTION = "bad_resolution"
+    """Its resolution is zero, negative or not a number."""
+    BAD_ORIGIN = "bad_origin"
+    """Its origin is not finite, or not a pose in the plane."""
+    TOO_LARGE = "too_large"
+    """A side has more than 100 000 cells."""
+    EMPTY = "empty"
+    """It has no cells."""
+    UPDATE_BEFORE_GRID = "update_before_grid"
+    """An update of a part, before any full map."""
+    UPDATE_OUTSIDE_GRID = "update_outside_grid"
+    """An update of a part that is not within the last full map."""
+    BAD_TRANSFORM = "bad_transform"
+    """A transform in it has no finite shift, no rotation, or not two frames; the others in it are used."""
+    BAD_STAMP = "bad_stamp"
+    """Its header's time is far from those around it: it is taken at the time at which it was recorded."""
+    OVER_MEMORY = "over_memory"
+    """It would need more memory than --max-memory allows."""
+    ENDS_EARLY = "ends_early"
+    """The file ends before the recording does."""
+    DAMAGED = "damaged"
+    """A part of the file cannot be read."""
+    WRONG_CHECKSUM = "wrong_checksum"
+    """A part of the file is not what was written: its checksum (CRC) is wrong."""
+    MISSING_PART = "missing_part"
+    """A file of the recording is not there."""
+    UNKNOWN_TYPE = "unknown_type"
+    """Its topic has no schema, or one that says something else than the standard, or an encoding that is not read."""

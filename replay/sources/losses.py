@@ -1,0 +1,60 @@
+"""What of a recording cannot be used though the rest can: nothing is left out in silence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from replay.skip_cause import SkipCause
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """A part of a recording that cannot be used.
+
+    Parameters
+    ----------
+    cause
+        Why.
+    place
+        Where it is in the recording, such as "the chunk at byte 4117".
+    detail
+        What was found and, where it helps, what was expected or what to do.
+    messages
+        How many messages are lost; None if that cannot be told.
+    topic
+        Whose they are, if they are of one topic; "" if not, or if that cannot be told.
+    """
+
+    cause: SkipCause
+    place: str
+    detail: str
+    messages: int | None = None
+    topic: str = ""
+
+
+class Losses:
+    """The losses of one recording, each once, in the order in which they were met.
+
+    They are met when the recording is opened, and while its messages are read; who reads asks from time to time which
+    are new.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[Loss, None] = {}
+        self._new: list[Loss] = []
+
+    def add(self, loss: Loss) -> None:
+        """Take in a loss, unless it is known."""
+        if loss not in self._known:
+            self._known[loss] = None
+            self._new.append(loss)
+
+    def new(self) -> tuple[Loss, ...]:
+        """Return the losses that were met since this was asked last."""
+        found, self._new = tuple(self._new), []
+        return found
+
+    @property
+    def all(self) -> tuple[Loss, ...]:
+        """All that were met so far."""
+        return tuple(self._known)
