@@ -113,7 +113,7 @@ class TestInputs:
             "clocks": {"/r1/map": "header", "/r2/map": "header"},
             "offsets_ns": {"/r1/map": 0, "/r2/map": 0},
             "messages": 6,
-            "until_ns": 102_000_000_000,
+            "until_ns": 1_700_000_022_000_000_000,
             "late": 0,
             "transforms": {},
         }
