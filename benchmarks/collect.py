@@ -21,7 +21,7 @@ def main() -> None:
         parser.error(f"--missions {options.missions}: seeds from {SEEDS_OF_MISSIONS} on are those of look-alike floors")
     if options.cuts and data_folder() is None:
         parser.error(
-            f"--cuts {options.cuts}: there are no recordings; set {VARIABLE} to their folder, or give --cuts 0"
+            f"--cuts {options.cuts}: there are no recordings; set {VARIABLE} to the folder of real/, or give --cuts 0"
         )
     collect(jobs(options.missions, options.cuts), options.out, options.processes)
 

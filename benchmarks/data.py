@@ -29,9 +29,9 @@ class Truth:
 
 
 def data_folder() -> Path | None:
-    """Return the folder of recordings, ``$REPLAY_DATA`` or ``../shared/data`` from the checkout; None if absent."""
+    """Return the folder of ``real/``: ``$REPLAY_DATA``, or ``../shared/data`` from the checkout; None if absent."""
     folder = Path(os.environ.get(VARIABLE, Path(__file__).resolve().parents[2] / "shared" / "data"))
-    return folder if folder.is_dir() else None
+    return folder if (folder / "real").is_dir() else None
 
 
 def read_truth(path: Path) -> dict[str, Truth]:

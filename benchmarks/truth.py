@@ -52,7 +52,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if part == "simulated":
             measured, held = _simulated(options, methods)
         elif folder is None:
-            print(f"{part}: not measured, for the maps are absent; set REPLAY_DATA to their folder", file=sys.stderr)
+            print(
+                f"{part}: not measured, for the maps are absent; set REPLAY_DATA to the folder that holds real/",
+                file=sys.stderr,
+            )
             continue
         else:
             measured, held = (_real if part == "real" else _published)(options, methods, folder)

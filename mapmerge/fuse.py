@@ -183,7 +183,7 @@ class Canvas:
     def _published(self, lattice: Grid) -> Grid:
         box = self._cells.box
         corner = Sim2(box.left * lattice.resolution_m, box.top * lattice.resolution_m)
-        return Grid(self._cells.cells, lattice.resolution_m, lattice.map_from_grid @ corner, has_valid_values=True)
+        return Grid(self._cells.cells, lattice.resolution_m, lattice.map_from_grid @ corner, is_own=True)
 
 
 def _differing(before: Warp, after: Warp, changed: Box) -> Iterator[Box]:

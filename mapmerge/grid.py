@@ -40,13 +40,14 @@ class Grid:
     ----------
     cells
         Shape (rows, columns), int8: probability of being occupied in percent, 0 to 100, or −1 for unknown.
-        Row 0 has the lowest y, as in ``nav_msgs/OccupancyGrid``. Made read-only.
+        Row 0 has the lowest y, as in ``nav_msgs/OccupancyGrid``. Copied, unless they are read-only, so that a buffer
+        which is written to again changes no grid.
     resolution_m
         Side of a cell.
     map_from_grid
         Pose in the map frame of the outer corner of cell (0, 0), rigid: ``info.origin`` of the message.
-    has_valid_values
-        Whether the cells are from other grids, so that their values need not be checked again.
+    is_own
+        Whether the cells are from other grids, or nobody else writes to them: they are neither checked nor copied.
 
     Raises
     ------
@@ -57,9 +58,9 @@ class Grid:
     cells: Cells
     resolution_m: float
     map_from_grid: Sim2 = field(default=IDENTITY)
-    has_valid_values: InitVar[bool] = False
+    is_own: InitVar[bool] = False
 
-    def __post_init__(self, has_valid_values: bool) -> None:
+    def __post_init__(self, is_own: bool) -> None:
         if self.cells.ndim != 2 or self.cells.dtype != np.int8:
             raise GridError(f"cells are {self.cells.dtype} of shape {self.cells.shape}; expected int8 [rows, columns]")
         if not (math.isfinite(self.resolution_m) and self.resolution_m > 0.0):
@@ -67,7 +68,7 @@ class Grid:
         if max(self.cells.shape) > MAX_SIDE_CELLS:
             rows, cols = self.cells.shape
             raise GridError(f"the grid has {cols} × {rows} cells; a side of at most {MAX_SIDE_CELLS} is expected")
-        if self.cells.size and not has_valid_values:
+        if self.cells.size and not is_own:
             self._check_values()
         pose = self.map_from_grid
         if not all(map(math.isfinite, (pose.x_m, pose.y_m, pose.yaw_rad))):
@@ -75,9 +76,9 @@ class Grid:
         if pose.scale != 1.0:
             raise GridError(f"the origin has scale {pose.scale}; a rigid pose is expected")
         if self.cells.flags.writeable:
-            view = self.cells.view()
-            view.flags.writeable = False
-            object.__setattr__(self, "cells", view)
+            cells = self.cells.view() if is_own else self.cells.copy()
+            cells.flags.writeable = False
+            object.__setattr__(self, "cells", cells)
 
     def _check_values(self) -> None:
         low, high = self.cells.min(), self.cells.max()
@@ -138,7 +139,7 @@ class Grid:
         row, col = int(rows[0]), int(cols[0])
         corner = Sim2(col * self.resolution_m, row * self.resolution_m)
         cells = self.cells[row : int(rows[-1]) + 1, col : int(cols[-1]) + 1]
-        return Grid(cells, self.resolution_m, self.map_from_grid @ corner, has_valid_values=True)
+        return Grid(cells, self.resolution_m, self.map_from_grid @ corner, is_own=True)
 
     def _edges(self) -> tuple[Cells, ...]:
         return self.cells[0], self.cells[-1], self.cells[:, 0], self.cells[:, -1]

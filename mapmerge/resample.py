@@ -23,9 +23,9 @@ def at_resolution(grid: Grid, resolution_m: float, config: CellConfig) -> Grid:
     if abs(ratio - 1.0) < _SAME:
         return grid
     if grid.cells.size == 0:
-        return Grid(grid.cells, resolution_m, grid.map_from_grid)
+        return Grid(grid.cells, resolution_m, grid.map_from_grid, is_own=True)
     cells = _pooled(grid.cells, ratio, config) if ratio > 1.0 else _repeated(grid.cells, ratio)
-    return Grid(cells, resolution_m, grid.map_from_grid)
+    return Grid(cells, resolution_m, grid.map_from_grid, is_own=True)
 
 
 def _starts(count: int, ratio: float) -> NDArray[np.intp]:

@@ -144,4 +144,4 @@ def _merged(placed: Placed, grids: Mapping[str, Grid], config: MergeConfig) -> G
     base_from_component = component_from_base.inverse()
     layers = [Layer(grids[robot], base_from_component @ component_from[robot]) for robot in sorted(component_from)]
     merged = fuse(layers, grids[base], config.cells).grid
-    return Grid(merged.cells, merged.resolution_m, component_from_base @ merged.map_from_grid)
+    return Grid(merged.cells, merged.resolution_m, component_from_base @ merged.map_from_grid, is_own=True)

@@ -37,4 +37,4 @@ def assemble(last: Grid | None, message: GridMessage | UpdateMessage) -> Grid:
         raise BadMessage(SkipCause.UPDATE_OUTSIDE_GRID, detail)
     cells = last.cells.copy()
     cells[message.row : message.row + rows, message.col : message.col + cols] = message.cells
-    return Grid(cells, last.resolution_m, last.map_from_grid)
+    return Grid(cells, last.resolution_m, last.map_from_grid, is_own=True)

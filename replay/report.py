@@ -90,6 +90,7 @@ class ReportBuilder:
                     "event": str(change.kind),
                     "reason": _reason(change.reason),
                     "trigger": None if change.trigger is None else str(change.trigger),
+                    "merged_from_map": _pose(result.robots[change.robot].merged_from_map),
                 }
             )
         for pair, trigger in result.searched.items():

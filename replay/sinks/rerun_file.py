@@ -11,6 +11,7 @@ import rerun as rr
 
 from mapmerge.config import CellConfig
 from mapmerge.match import CALIBRATED
+from replay.decisions import Entry, decisions
 from replay.events import Event, Finished, Merged, Noted, Report, RobotPicture, Skipped, Started
 from replay.options import NS_PER_S, OutputOptions
 from replay.sinks import rerun_text as text
@@ -70,7 +71,7 @@ class _Writer:
         limit_of = "confidence" if merge["method"] in CALIBRATED else "acceptance"
         self._plots = Plots(self.stream, robots, limit_of, merge["verify"][f"min_{limit_of}"])
         self._steps: dict[str, list[str]] = {}
-        self._waiting: list[text.Entry] = []
+        self._waiting: list[Entry] = []
         self._table = ""
         self._span: Span | None = None
 
@@ -100,7 +101,7 @@ class _Writer:
             self._show_picture(item)
         self._plots.show(event.report, event.timing)
         self._say_waiting()
-        for entry in text.decisions(event.result):
+        for entry in decisions(event.result):
             self._say(entry)
         self._show_table(event.report)
 
@@ -128,7 +129,7 @@ class _Writer:
             self._say(entry)
         self._waiting.clear()
 
-    def _say(self, entry: text.Entry) -> None:
+    def _say(self, entry: Entry) -> None:
         level, words = entry
         if self._span is None:
             self.stream.log(DECISIONS, rr.TextLog(words, level=level), static=True)

@@ -191,7 +191,7 @@ def _shrunk(grid: Grid, cells: CellConfig) -> Grid:
         at_resolution(Grid(grid.cells[band.slices(whole)], grid.resolution_m), resolution_m, cells).cells
         for band in whole.bands(_BAND_CELLS * factor)
     ]
-    return Grid(np.concatenate(parts), resolution_m, grid.map_from_grid)
+    return Grid(np.concatenate(parts), resolution_m, grid.map_from_grid, is_own=True)
 
 
 def _corners_m(grid: Grid) -> Points:

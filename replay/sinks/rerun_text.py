@@ -1,4 +1,4 @@
-"""Words in the Rerun recording: what is said of changes, of the robots, and of the run."""
+"""Words in the Rerun recording: what is said of the robots, and of the run."""
 
 from __future__ import annotations
 
@@ -7,23 +7,11 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from mapmerge.merger import MergeResult
-from mapmerge.outcome import Change, ChangeKind
-from mapmerge.sim2 import Sim2
+from replay.decisions import INFO, WARN, Entry
 from replay.events import Noted, Report, Skipped
 from replay.words import lost
 
-INFO, WARN = "INFO", "WARN"
-Entry = tuple[str, str]
-"""Level and text of an entry of the log."""
-
 _COLUMNS = ("robot", "status", "x, m", "y, m", "yaw, °", "acceptance", "overlap, m²", "confidence", "reason")
-
-
-def decisions(result: MergeResult) -> Iterator[Entry]:
-    """Say what jumped, or was placed, moved or withdrawn in a step."""
-    for change in result.changes:
-        yield _decision(change, result.robots[change.robot].merged_from_map)
 
 
 def skipped(event: Skipped) -> Entry:
@@ -62,18 +50,6 @@ def about(report: Report) -> str:
     parts += [_block(item) for item in report["inputs"]]
     parts += ["## Settings", _block(report["settings"])]
     return "\n\n".join(parts) + "\n"
-
-
-def _decision(change: Change, pose: Sim2 | None) -> Entry:
-    why = f" (searched, as {change.trigger.words})" if change.trigger else ""
-    if change.kind is ChangeKind.JUMPED:
-        return WARN, f"the map of {change.robot} jumped in its own frame: {change.reason.message}"
-    if change.kind is ChangeKind.WITHDRAWN or pose is None:
-        return WARN, f"{change.robot} is withdrawn: {change.reason.message}{why}"
-    at = f"x {pose.x_m:.2f} m, y {pose.y_m:.2f} m, yaw {math.degrees(pose.yaw_rad):.1f}°"
-    if change.kind is ChangeKind.MOVED:
-        return INFO, f"{change.robot} moved to {at}: {change.reason.message}{why}"
-    return INFO, f"{change.robot} {change.reason.message}; at {at}"
 
 
 def _row(robot: str, values: Mapping[str, Any]) -> tuple[str, ...]:

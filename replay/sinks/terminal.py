@@ -9,7 +9,9 @@ from collections.abc import Sequence
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from replay.decisions import decisions
 from replay.events import Event, Merged, Noted, Report, Skipped, Started
+from replay.options import NS_PER_S
 from replay.words import counted, intention, lost, recovered, unused
 
 if TYPE_CHECKING:
@@ -79,6 +81,7 @@ class Narrator:
         self._merge_s = 0.0
         self._render_s = 0.0
         self._ticks = 0
+        self._first_ns: int | None = None
         self._skipped: Counter[str] = Counter()
 
     def take(self, event: Event) -> None:
@@ -92,9 +95,17 @@ class Narrator:
         elif isinstance(event, Noted):
             self._say(f"{event.robot}: {event.message}")
         elif isinstance(event, Merged):
+            self._say_decided(event)
             self._merge_s += event.timing.merge_s
             self._render_s += event.timing.render_s
             self._ticks += 1
+
+    def _say_decided(self, event: Merged) -> None:
+        """Say what jumped, or was placed, moved or withdrawn, and when."""
+        self._first_ns = event.stamp_ns if self._first_ns is None else self._first_ns
+        after_s = (event.stamp_ns - self._first_ns) / NS_PER_S
+        for _, words in decisions(event.result):
+            self._say(f"+{after_s:.1f} s: {words}")
 
     def _say_skipped(self, event: Skipped) -> None:
         """Name the first few of each cause; `sum_up` counts them all."""

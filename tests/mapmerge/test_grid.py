@@ -67,6 +67,13 @@ class TestValue:
         with pytest.raises(AttributeError):
             grid.resolution_m = 0.1
 
+    def test_does_not_change_with_the_array_that_it_was_made_of(self):
+        """As of a SLAM that publishes from one buffer."""
+        buffer = np.zeros((2, 3), np.int8)
+        grid = Grid(buffer, 0.1)
+        buffer[:] = 100
+        assert not grid.cells.any()
+
     def test_leaves_the_given_array_writeable(self):
         cells = CELLS.copy()
         Grid(cells, 0.05)

@@ -34,7 +34,7 @@ def occupied_m(picture):
 @given(st.floats(-44.0, 44.0))
 def test_a_turned_room_is_turned_back(turn_deg):
     found = radon(occupied_m(room(math.radians(turn_deg))), STEP_RAD, 0.1)
-    assert math.degrees(found.turn_rad) == pytest.approx(-turn_deg, abs=0.75)
+    assert math.degrees(found.turn_rad) == pytest.approx(-turn_deg, abs=1.25)  # two steps, and walls are a cell thick
 
 
 def test_the_largest_value_is_the_longest_wall():
