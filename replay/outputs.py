@@ -22,17 +22,18 @@ def refuse_outputs(outputs: OutputOptions, inputs: Sequence[Path]) -> None:
     ReplayError
         With the reason.
     """
-    refuse_inputs(all_output_paths(outputs).values(), inputs)
+    finals = all_output_paths(outputs).values()
+    refuse_inputs([name for path in finals for name in (path, partial_name(path))], inputs)
     refuse_existing(outputs)
     for path in output_paths(outputs).values():
         refuse_unwritable(path)
 
 
 def refuse_inputs(paths: Iterable[Path], inputs: Sequence[Path]) -> None:
-    """Refuse names, and temporary names, that are those of inputs, by whatever link, or that lie in one."""
+    """Refuse names that are those of inputs, by whatever link, or that lie in one."""
     folders = {path.resolve() for path in inputs}
     files = {identity for path in inputs for identity in _identities(path)}
-    for path in (name for final in paths for name in (final, partial_name(final))):
+    for path in paths:
         resolved = path.resolve()
         if {resolved, *resolved.parents} & folders or _identity(path) in files:
             raise UsageError(f"{path} is an input, or would be written into one; give another name with --output")

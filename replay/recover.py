@@ -79,7 +79,7 @@ def recover(damaged: Path, output: Path, *, force: bool = False) -> Recovery:
         If nothing can be recovered, or the new file cannot be written.
     """
     options = OutputOptions(output, force=force)
-    refuse_inputs([output, _temporary(output)], [damaged])
+    refuse_inputs([*all_output_paths(options).values(), _temporary(output)], [damaged])
     refuse_existing(options)
     refuse_unwritable(output)
     with ExitStack() as stack:
@@ -122,6 +122,8 @@ def _opened(path: Path) -> Iterator[RecordFile]:
             magic = file.read(len(MAGIC))
         if not is_free:
             raise InputError(f"{path}: a run is still writing it; wait until that has ended")
+        if not size:
+            raise InputError(f"{path}: it is empty, so there is nothing to recover")
         if magic != MAGIC:
             raise InputError(f"{path}: it does not begin as an MCAP does; expected one that was cut off")
         yield RecordFile(path, file, size)

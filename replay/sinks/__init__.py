@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
@@ -12,7 +12,7 @@ from replay.errors import UsageError
 from replay.interrupts import held_off
 from replay.options import OutputOptions
 from replay.sinks.base import Sink
-from replay.sinks.partial_file import PartialFile
+from replay.sinks.partial_file import PartialFile, partial_name
 from replay.sinks.publication import publish
 
 __all__ = ["SINKS", "Sink", "all_output_paths", "open_sinks", "output_paths", "refuse_existing"]
@@ -53,15 +53,14 @@ def open_sinks(
     extra
         Sinks that are open already.
     say
-        Is told what an earlier run left and this one replaces.
+        Is told what an earlier run left and this one removes.
     """
     files = {name: PartialFile(path) for name, path in output_paths(options).items()}
     sinks: list[Sink] = []
     try:
         for file in files.values():
-            file.claim()
-            if file.replaced_bytes:
-                say(f"an earlier run was cut off and left {file.partial}; it is replaced")
+            _claim(file, say)
+        _remove_left_over(set(all_output_paths(options).values()) - {file.path for file in files.values()}, say)
         refuse_existing(options)  # once more: another run may have published between the first time and the claim
         for name, file in files.items():
             module, _, attribute = SINKS[name].partition(":")
@@ -82,3 +81,18 @@ def open_sinks(
             for file in files.values():  # of a sink that was interrupted while it was opened
                 file.discard()
         raise
+
+
+def _claim(file: PartialFile, say: Callable[[str], object]) -> None:
+    file.claim()
+    if file.replaced_bytes:
+        say(f"an earlier run was cut off and left {file.partial}; it is removed")
+
+
+def _remove_left_over(unwritten: Collection[Path], say: Callable[[str], object]) -> None:
+    """Remove what an earlier run left of files that this one does not write."""
+    for path in unwritten:
+        if partial_name(path).exists():
+            file = PartialFile(path)
+            _claim(file, say)
+            file.discard()
