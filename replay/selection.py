@@ -12,7 +12,6 @@ from replay.robot_names import file_names, is_costmap_or_mask, names_in, namespa
 from replay.runs import RunPath, TopicChoice
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, SourceInfo
 
-
 MOST_UNNAMED = 100
 """Every pair of robots is matched: of more robots than this, somebody must have meant it."""
 
