@@ -67,12 +67,13 @@ class Large:
         if self.kind == "maps":
             times = self.size_bytes // maps_bytes + 1
             pairs = zip(maps[::2], maps[1::2], strict=True)
-            yield from _in_time(each for pair in pairs for each in pair * times)
+            yield from _in_time((each for pair in pairs for each in pair * times), SECOND_NS)
             return
         cloud = np.random.default_rng(3).bytes(CLOUD_BYTES)
         clouds = (self.size_bytes - maps_bytes - self.small * IMU_BYTES) // CLOUD_BYTES // len(maps) + 1
         yield from _in_time(
-            each for one in maps for each in _with_others(one, cloud, clouds, max(self.small // len(maps) // clouds, 1))
+            (each for one in maps for each in _with_others(one, cloud, clouds, self.small // len(maps) // clouds)),
+            SECOND_NS // 1000,
         )
 
 
@@ -86,10 +87,10 @@ def _with_others(one: Message, cloud: bytes, clouds: int, imus: int) -> Iterator
             yield Message("/imu", IMU_TYPE, 0, imu)
 
 
-def _in_time(messages: Iterator[Message]) -> Iterator[Message]:
+def _in_time(messages: Iterator[Message], period_ns: int) -> Iterator[Message]:
     """Give messages their times; each map says when it was made."""
     for number, each in enumerate(messages):
-        log_ns = START_NS + number * SECOND_NS // 1000
+        log_ns = START_NS + number * period_ns
         yield each._replace(log_ns=log_ns, data=_stamped(each.data, log_ns) if each.msgtype == GRID_TYPE else each.data)
 
 
