@@ -13,14 +13,14 @@ from replay.sources import open_source
 from tests import bags
 from tests.bags import SECOND, START, TEXT_TYPE, Recorded, recorded_map
 
-CHUNK_BYTES = 200_000
-FEW, MANY = 1000, 20_000
+CHUNK_BYTES = 50_000
+FEW, MANY = 1000, 40_000
 # A row for each message would take at least 24 bytes.
 MOST_GROWTH_BYTES = 10 * (MANY - FEW)
 WRITERS: dict[str, Callable[[Path, list[Recorded]], Path]] = {
     "bag": lambda path, messages: bags.write_rosbag1(path, messages, chunk_bytes=CHUNK_BYTES),
     "mcap": lambda path, messages: bags.write_mcap(path, messages, chunk_bytes=CHUNK_BYTES),
-    "db3": lambda path, messages: bags.write_bare_db3(path, messages),
+    "db3": bags.write_bare_db3,
 }
 
 
