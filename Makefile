@@ -2,8 +2,12 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+TOOLS := .venv-tools
+# Only what requirements/ pins is installed, and only if its hash is right.
+PINNED := install --quiet --require-hashes --requirement
+PROJECT := install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: demo test check format docs bench picture clean
+.PHONY: demo test check format docs bench picture lock audit clean
 
 demo: $(VENV)/.runtime ## set up and merge a sample recording
 	mkdir -p out
@@ -33,15 +37,28 @@ picture: $(VENV)/.runtime ## take README's picture anew; needs a graphics card o
 	$(BIN)/replay merge samples/three_robots.bag -o out/three_robots.mcap --force
 	$(BIN)/python scripts/screenshot.py out/three_robots.rrd docs/images/three_robots.png
 
-clean:
-	rm -rf $(VENV) out
+lock: $(TOOLS)/.installed ## write requirements/ anew after pyproject.toml has changed; UPGRADE=1: the newest versions
+	$(TOOLS)/bin/python scripts/lock.py $(if $(UPGRADE),--upgrade)
 
-$(VENV)/.runtime: pyproject.toml
+audit: $(TOOLS)/.installed ## ask for known vulnerabilities of what is pinned; OFFLINE_OK=1: go on if nobody answers
+	$(TOOLS)/bin/python scripts/audit.py $(if $(OFFLINE_OK),--offline-ok)
+
+clean:
+	rm -rf $(VENV) $(TOOLS) out
+
+$(VENV)/.runtime: pyproject.toml requirements/run.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --editable .
+	$(BIN)/pip $(PINNED) requirements/run.txt
+	$(BIN)/pip $(PROJECT)
 	touch $@
 
-$(VENV)/.dev: pyproject.toml
+$(VENV)/.dev: pyproject.toml requirements/dev.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --editable '.[dev]'
+	$(BIN)/pip $(PINNED) requirements/dev.txt
+	$(BIN)/pip $(PROJECT)
 	touch $@ $(VENV)/.runtime
+
+$(TOOLS)/.installed: requirements/tools.txt
+	$(PYTHON) -m venv $(TOOLS)
+	$(TOOLS)/bin/pip $(PINNED) requirements/tools.txt
+	touch $@

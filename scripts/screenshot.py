@@ -45,13 +45,29 @@ def viewer(size: str = "1400x900") -> Iterator[ViewerClient]:
         port = free.getsockname()[1]
     options = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", size]
     with tempfile.TemporaryDirectory() as scratch, (Path(scratch) / "log").open("w+b") as log:
-        environment = {**os.environ, "XDG_RUNTIME_DIR": scratch, "CI": "1"}  # CI: no analytics
-        process = subprocess.Popen([str(program), *options], stdout=log, stderr=subprocess.STDOUT, env=environment)
+        process = subprocess.Popen(
+            [str(program), *options], stdout=log, stderr=subprocess.STDOUT, env=private_environment(scratch)
+        )
         try:
             yield _connected(process, port, Path(log.name))
         finally:
             process.terminate()
             process.wait()
+
+
+def private_environment(scratch: str) -> dict[str, str]:
+    """Return the environment in which the viewer tells nobody that it runs, and leaves nothing behind.
+
+    By itself it sends usage data, asks whether there is a newer release of it, and keeps settings in the home folder.
+    """
+    nobody = "http://127.0.0.1:9"  # no flag switches the question for a release off; nothing listens there
+    return {
+        **os.environ,
+        "CI": "1",  # no usage data
+        "HTTPS_PROXY": nobody,
+        "https_proxy": nobody,
+        **dict.fromkeys(("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "XDG_RUNTIME_DIR"), scratch),
+    }
 
 
 def show(client: ViewerClient, recording: Path, time_fraction: float | None = None) -> None:

@@ -17,6 +17,8 @@ Mode = Literal["trinary", "scale", "raw"]
 _SCALE = 257
 _MAX = 65535
 _ALPHA = 3
+# Brightness takes many times the memory of a pixel.
+_ROWS_AT_ONCE = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,15 @@ def cells_from_pixels(pixels: Pixels, mode: Mode, thresholds: Thresholds) -> Cel
         Shape (rows, columns), the lowest y first.
     """
     image = pixels.reshape(*pixels.shape[:2], -1)[::-1]
+    cells = np.empty(image.shape[:2], np.int8)
+    for row in range(0, len(cells), _ROWS_AT_ONCE):
+        part = slice(row, row + _ROWS_AT_ONCE)
+        cells[part] = _cells(image[part], mode, thresholds)
+    return cells
+
+
+def _cells(image: Pixels, mode: Mode, thresholds: Thresholds) -> Cells:
+    """Return the cells of pixels of shape (rows, columns, channels), in the order of their rows."""
     colours = image if mode == "trinary" else image[..., :_ALPHA]
     shade = _shade(colours)
     if mode == "raw":

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import functools
 import math
+import os
 import re
 import reprlib
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any, cast, get_args
 
 import numpy as np
@@ -22,8 +23,10 @@ from replay.codec import encode_grid
 from replay.errors import InputError
 from replay.sources.base import GRID_TYPE, RawMessage, SourceInfo, TopicInfo
 from replay.sources.boundary import COMMON, Closing, translated
+from replay.sources.image_file import read_pixels
 from replay.sources.losses import Losses
-from replay.sources.map_image import Mode, Pixels, Thresholds, cells_from_pixels
+from replay.sources.map_image import Mode, Thresholds, cells_from_pixels
+from replay.sources.yaml_text import load_yaml
 
 TOPIC = "/map"
 FRAME_ID = "map"
@@ -51,9 +54,8 @@ class _Description:
 @functools.cache
 def _foreign() -> tuple[type[Exception], ...]:
     import cv2
-    from ruamel.yaml.error import YAMLError
 
-    return (*COMMON, YAMLError, cv2.error)
+    return (*COMMON, cv2.error)
 
 
 class SavedMap(Closing):
@@ -81,7 +83,7 @@ class SavedMap(Closing):
             return
         with translated(self.path, _foreign()):
             known = self._description
-            cells = cells_from_pixels(_pixels(self.path, known.image), known.mode, known.thresholds)
+            cells = cells_from_pixels(read_pixels(self.path, known.image), known.mode, known.thresholds)
             grid = Grid(cells, known.resolution_m, known.map_from_grid)
             data = bytes(encode_grid(grid, FRAME_ID, stamp_ns=0))
         yield RawMessage(TOPIC, GRID_TYPE, "cdr", 0, data)
@@ -100,11 +102,8 @@ def _description(path: Path) -> _Description:
             f"{path}: the key '{missing[0]}' is missing; expected the description of a saved map with "
             f"{', '.join(_REQUIRED)}"
         )
-    image = path.parent / str(document["image"])
-    if not image.is_file():
-        raise InputError(f"{path}: its image {image} does not exist; copy it to that place, or correct 'image'")
     return _Description(
-        image,
+        _image(path, document["image"]),
         _resolution_m(path, document["resolution"]),
         _origin(path, document["origin"]),
         _mode(path, document),
@@ -116,10 +115,25 @@ def _description(path: Path) -> _Description:
     )
 
 
-def _document(path: Path) -> dict[str, Any]:
-    from ruamel.yaml import YAML
+def _image(path: Path, value: object) -> Path:
+    """Return where the image is: as ROS has it, anywhere on this machine, relative to the YAML file or not."""
+    if not isinstance(value, str):
+        raise _wrong(path, "image", value, "the path of an image")
+    if os.name == "nt" and _names_another_machine(value):
+        raise _wrong(path, "image", value, "a path on this machine: copy the image here")
+    image = path.parent / value
+    if not image.is_file():
+        raise InputError(f"{path}: its image {image} does not exist; copy it to that place, or correct 'image'")
+    return image
 
-    document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+
+def _names_another_machine(image: str) -> bool:
+    r"""Tell whether Windows would ask another machine for this path, as for ``\\machine\share\map.pgm``."""
+    return PureWindowsPath(image).drive.startswith("\\\\")
+
+
+def _document(path: Path) -> dict[str, Any]:
+    document = load_yaml(path)
     if not isinstance(document, dict):
         raise InputError(f"{path}: the key '{_REQUIRED[0]}' is missing; expected the description of a saved map")
     return document
@@ -176,19 +190,3 @@ def _mode(path: Path, document: dict[str, Any]) -> Mode:
         if mode == name:
             return mode
     raise _wrong(path, "mode", document["mode"], f"one of {', '.join(_MODES)}")
-
-
-def _pixels(path: Path, image: Path) -> Pixels:
-    """Return the pixels of a map's image as they are stored, 8 bits a channel."""
-    import cv2
-
-    # Not imread, which cannot open every name on Windows.
-    content = np.fromfile(image, np.uint8)
-    pixels = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
-    if pixels is None:
-        raise InputError(f"{path}: its image {image} cannot be read; expected PGM, PNG or BMP")
-    if pixels.dtype != np.uint8:
-        raise InputError(
-            f"{path}: its image {image} is {pixels.dtype}; expected 8 bits a channel: convert it to 8 bits"
-        )
-    return pixels.astype(np.uint8, copy=False)

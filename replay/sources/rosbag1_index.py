@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import errno
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 from replay.sources.rosbag1_chunks import ChunkPlace
-from replay.sources.rosbag1_records import CHUNK, CHUNK_INFO, CONNECTION, Record, record_of
+from replay.sources.rosbag1_records import CHUNK, CHUNK_INFO, CONNECTION, Record, index_rows, record_of
 from replay.sources.rosbag1_scan import BagFile, Entry, Topic, index_section
 
 if TYPE_CHECKING:
-    from rosbags.rosbag1 import Reader
+    from replay.sources.rosbag1_lean import LeanReader
 
 
 class UnusableIndexError(Exception):
@@ -33,28 +33,36 @@ class Index:
         How many messages each chunk has.
     """
 
-    def __init__(self, reader: Reader, chunks: Mapping[int, ChunkPlace]) -> None:
+    def __init__(self, reader: LeanReader, chunks: Mapping[int, ChunkPlace], file: BinaryIO) -> None:
         self.topics = {each.id: Topic(each.topic, each.msgtype, each.msgdef.data) for each in reader.connections}
         self.chunks = chunks
         self.chunk_counts = {each.pos: sum(each.connection_counts.values()) for each in reader.chunk_infos}
-        # rosbags lets go of it when it is closed
-        self._rows = dict(reader.indexes)
+        self._file = file
+        self._places = reader.places
+        self._counts = sum(reader.listed.values(), Counter[int]())
+        self._times_ns = reader.times_ns
 
     def counts(self) -> Mapping[int, int]:
         """Return how many messages each connection has."""
-        return {key: len(rows) for key, rows in self._rows.items()}
+        return self._counts
 
     def times_ns(self) -> tuple[int, int] | None:
         """Return the times of the first and last message; None if there is none."""
-        # in order of time each
-        ends = [(rows[0].time, rows[-1].time) for rows in self._rows.values() if rows]
-        return (min(start for start, _ in ends), max(stop for _, stop in ends)) if ends else None
+        return self._times_ns
 
     def entries(self, connections: Collection[int]) -> list[Entry]:
         """Return where the messages of these connections are, sorted."""
-        return sorted(
-            Entry(each.time, each.chunk_pos, each.offset, key) for key in connections for each in self._rows[key]
-        )
+        return sorted(entry for key in connections for entry in self._entries_of(key))
+
+    def _entries_of(self, connection: int) -> Iterator[Entry]:
+        places = self._places.get(connection, ())
+        for place, chunk in zip(places[::2], places[1::2], strict=True):
+            record = record_of(self._file, place)
+            if record is None:
+                raise ValueError(f"the index record at byte {place} is not there any more")
+            self._file.seek(record.data)
+            rows = self._file.read(record.end - record.data)
+            yield from (Entry(time_ns, chunk, inner, connection) for time_ns, inner in index_rows(rows))
 
 
 def read_index(path: Path, file: BagFile, header: Record, foreign: tuple[type[Exception], ...]) -> Index:
@@ -65,15 +73,15 @@ def read_index(path: Path, file: BagFile, header: Record, foreign: tuple[type[Ex
     UnusableIndexError
         If it cannot be read, or contradicts itself.
     """
-    from rosbags.rosbag1 import Reader
+    from replay.sources.rosbag1_lean import LeanReader
 
     records = list(index_section(file.file, file.index_pos))
     _check_counts(file, header, records)
     connections_in = [each.number(b"count") for each in records if each.op == CHUNK_INFO]
     try:
-        with Reader(path) as reader:
+        with LeanReader(path) as reader:
             _check_chunk_counts(reader, connections_in)
-            return Index(reader, {start: _place(file, start) for start in reader.chunks})
+            return Index(reader, {start: _place(file, start) for start in reader.chunks}, file.file)
     except foreign as error:
         # which is what a place beyond all files leads to
         if isinstance(error, OSError) and error.errno != errno.EINVAL:
@@ -98,7 +106,7 @@ def _check_counts(file: BagFile, header: Record, records: Sequence[Record]) -> N
     )
 
 
-def _check_chunk_counts(reader: Reader, connections_in: Collection[int]) -> None:
+def _check_chunk_counts(reader: LeanReader, connections_in: Collection[int]) -> None:
     """Compare what two parts of the index say of each chunk.
 
     Parameters
@@ -106,13 +114,9 @@ def _check_chunk_counts(reader: Reader, connections_in: Collection[int]) -> None
     connections_in
         How many connections each chunk has; rosbags takes two that are called alike for one.
     """
-    listed: dict[int, Counter[int]] = {info.pos: Counter() for info in reader.chunk_infos}
-    for key, rows in reader.indexes.items():
-        for row in rows:
-            listed[row.chunk_pos][key] += 1
     for info, connections in zip(reader.chunk_infos, connections_in, strict=True):
         counts = {key: count for key, count in info.connection_counts.items() if count}
-        if listed[info.pos] != counts or len(info.connection_counts) != connections:
+        if reader.listed.get(info.pos, {}) != counts or len(info.connection_counts) != connections:
             raise UnusableIndexError(f"its two lists of the messages in the chunk at byte {info.pos} differ")
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import BinaryIO, NamedTuple, Protocol
 
 from replay.skip_cause import SkipCause
+from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
 from replay.sources.losses import Loss, Losses
 from replay.sources.rosbag1_chunks import ChunkPlace, Problem, read_chunk, records_in
 from replay.sources.rosbag1_records import (
@@ -33,6 +34,7 @@ from replay.sources.topics import normalised_type
 _OUTER = (INDEX, CHUNK, CHUNK_INFO, CONNECTION)
 # Kinds that are never within a chunk.
 _SURE_OUTER = (INDEX, CHUNK, CHUNK_INFO)
+_USED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 _MOST_DEFINITION_BYTES = 1 << 24
 
 
@@ -99,6 +101,8 @@ class Scan:
         Takes what cannot be used.
     most_bytes
         How many bytes a chunk may have, decompressed.
+    kept
+        Connections whose messages are asked for, beside maps and transforms: of others it is not kept where they are.
 
     Attributes
     ----------
@@ -106,7 +110,7 @@ class Scan:
         Whether the file ends within a record.
     """
 
-    def __init__(self, file: BagFile, losses: Losses, most_bytes: int) -> None:
+    def __init__(self, file: BagFile, losses: Losses, most_bytes: int, kept: Collection[int] = ()) -> None:
         self.topics: dict[int, Topic] = {}
         self.chunks: dict[int, ChunkPlace] = {}
         self.is_cut = file.size <= file.start
@@ -116,8 +120,12 @@ class Scan:
         self._file = file.file
         self._losses = losses
         self._most_bytes = most_bytes
+        self._bag = file
+        self._kept = frozenset(kept)
         # time, chunk and place in it of each message, in turn, by connection
         self._found: dict[int, array[int]] = {}
+        self._counts: Counter[int] = Counter()
+        self._times_ns: dict[int, tuple[int, int]] = {}
         self._contradictory: set[int] = set()
         self._open: _OpenChunk | None = None
         self._pass(file.start)
@@ -135,21 +143,26 @@ class Scan:
 
     def counts(self) -> Mapping[int, int]:
         """Return how many messages each connection has."""
-        return {key: len(rows) // 3 for key, rows in self._found.items()}
+        return self._counts
 
     def times_ns(self) -> tuple[int, int] | None:
         """Return the times of the first and last message; None if there is none."""
-        times = [rows[::3] for rows in self._found.values() if rows]
-        return (min(map(min, times)), max(map(max, times))) if times else None
+        spans = self._times_ns.values()
+        return (min(start for start, _ in spans), max(stop for _, stop in spans)) if spans else None
 
     def entries(self, connections: Collection[int]) -> list[Entry]:
-        """Return where the messages of these connections are, sorted."""
-        return sorted(
+        """Return where the messages of these connections are, sorted; of such as are not kept, by another pass."""
+        asked = {key for key in connections if key in self._counts}
+        missing = {key for key in asked if len(self._found.get(key, ())) // 3 != self._counts[key]}
+        found = [
             Entry(rows[at], rows[at + 1], rows[at + 2], key)
-            for key, rows in self._found.items()
-            if key in connections
+            for key in asked - missing
+            for rows in (self._found[key],)
             for at in range(0, len(rows), 3)
-        )
+        ]
+        if missing:
+            found += Scan(self._bag, Losses(), self._most_bytes, missing).entries(missing)
+        return sorted(found)
 
     def _pass(self, start: int) -> None:
         """Go through the records of the file."""
@@ -254,7 +267,18 @@ class Scan:
         if loss is not None:
             self._losses.add(loss)
         for entry in found.entries:
-            self._found.setdefault(entry.connection, array("Q")).extend(entry[:3])
+            self._count(entry)
+
+    def _count(self, entry: Entry) -> None:
+        """Count a message, and keep where it is if that may be asked for."""
+        time_ns, key = entry.log_time_ns, entry.connection
+        first_ns, last_ns = self._times_ns.get(key, (time_ns, time_ns))
+        self._times_ns[key] = min(first_ns, time_ns), max(last_ns, time_ns)
+        self._counts[key] += 1
+        topic = self.topics.get(key)
+        # of a connection that is not known yet, it may be
+        if topic is None or topic.msgtype in _USED_TYPES or key in self._kept:
+            self._found.setdefault(key, array("Q")).extend(entry[:3])
 
     def _drop_unknown(self) -> None:
         """Leave out the messages of which nothing, or nothing that can be trusted, says what they are."""
@@ -265,7 +289,8 @@ class Scan:
                 detail = "two records say differently what these messages are"
             else:
                 continue
-            del self._found[key]
+            del self._counts[key], self._times_ns[key]
+            self._found.pop(key, None)
             self._losses.add(Loss(SkipCause.DAMAGED, f"connection {key}", detail, count))
         for key in self._contradictory:
             del self.topics[key]

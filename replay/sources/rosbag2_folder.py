@@ -19,6 +19,7 @@ from replay.sources.mcap_file import McapFile
 from replay.sources.mcap_scan import Scan
 from replay.sources.sqlite3_file import Sqlite3File
 from replay.sources.topics import topic_table
+from replay.sources.yaml_text import load_yaml
 from replay.sources.zstd import MAGIC as ZSTD_MAGIC
 from replay.sources.zstd import ZstdError, decompress_file
 
@@ -31,9 +32,7 @@ _HEAD_BYTES = 16
 
 @functools.cache
 def _foreign() -> tuple[type[Exception], ...]:
-    from ruamel.yaml.error import YAMLError
-
-    return (*COMMON, YAMLError, ZstdError)
+    return (*COMMON, ZstdError)
 
 
 class Rosbag2Folder(Closing):
@@ -243,10 +242,7 @@ def _present(path: Path, name: str) -> Path | None:
 
 
 def _metadata(path: Path) -> dict[str, Any]:
-    from ruamel.yaml import YAML
-
-    with translated(path, _foreign()):
-        document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    document = load_yaml(path)
     metadata = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
     if not isinstance(metadata, dict):
         raise InputError(
