@@ -37,8 +37,8 @@ class Options:
     tries: int = TRIES
     seconds: float | None = None
     seed: int = 0
-    formats: tuple[str, ...] = tuple(FORMATS)
-    faults: tuple[str, ...] = tuple(FAULTS)
+    formats: Sequence[str] = tuple(FORMATS)
+    faults: Sequence[str] = tuple(FAULTS)
     jobs: int = 1
     keep: Path | None = None
 
@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Try what was asked for and return 1 if something failed, else 0."""
     given = vars(_parser().parse_args(arguments))
     by_format, name = given.pop("by_format"), given.pop("replay")
-    options = Options(**{key: tuple(value) if isinstance(value, list) else value for key, value in given.items()})
+    options = Options(**given)
     if name is not None:
         return repeat(Case.named(name, options.seed), options.keep)
     counts = measured(options)

@@ -25,7 +25,7 @@ class Record:
         """What kind of record it is."""
         return dict(self.fields)[b"op"][0]
 
-    def bytes(self) -> bytes:
+    def packed(self) -> bytes:
         """Return the record as it is written."""
         fields = [name + b"=" + value for name, value in self.fields]
         header = b"".join(struct.pack("<I", len(each)) + each for each in fields)
@@ -56,7 +56,7 @@ def parsed(data: bytes) -> list[Record]:
 
 def written(records: list[Record]) -> bytes:
     """Return a bag of these records, its index at where its header says."""
-    return MAGIC + b"".join(each.bytes() for each in records)
+    return MAGIC + b"".join(each.packed() for each in records)
 
 
 def records_swapped(data: bytes, rng: Rng) -> bytes:

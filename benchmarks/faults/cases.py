@@ -71,6 +71,7 @@ def cases(formats: Sequence[str], faults: Sequence[str], seed: int) -> Iterator[
     rng = np.random.default_rng([seed, 5])
     for number in count():
         for index in rng.permutation(len(pairs)):
-            yield Case(*pairs[index], number, seed)
+            kind, fault = pairs[index]
+            yield Case(kind, fault, number, seed)
         if not pairs:
             return

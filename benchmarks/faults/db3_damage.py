@@ -65,10 +65,8 @@ def index_removed(data: bytes, rng: Rng) -> bytes:
 
 def row_doubled(data: bytes, rng: Rng) -> bytes:
     """Write a row twice."""
-    columns = "topic_id, timestamp, data"
-    return _changed(
-        data, f"INSERT INTO messages ({columns}) SELECT {columns} FROM messages WHERE id = {_any_row(data, rng)}"
-    )  # noqa: S608, E501
+    columns, key = "topic_id, timestamp, data", _any_row(data, rng)
+    return _changed(data, f"INSERT INTO messages ({columns}) SELECT {columns} FROM messages WHERE id = {key}")  # noqa: S608
 
 
 def page_zeroed(data: bytes, rng: Rng) -> bytes:

@@ -34,7 +34,7 @@ class Record:
     content: bytes
     told_length: int | None = None
 
-    def bytes(self) -> bytes:
+    def packed(self) -> bytes:
         """Return the record as it is written."""
         length = len(self.content) if self.told_length is None else self.told_length
         return _HEAD.pack(self.opcode, length) + self.content
@@ -63,7 +63,7 @@ def written(records: Sequence[Record]) -> bytes:
 
 def joined(records: Sequence[Record]) -> bytes:
     """Return records one after the other."""
-    return b"".join(each.bytes() for each in records)
+    return b"".join(each.packed() for each in records)
 
 
 def closed(records: Sequence[Record]) -> bytes:
@@ -74,7 +74,7 @@ def closed(records: Sequence[Record]) -> bytes:
     start = len(MAGIC) + len(data) if summary else 0
     head = _HEAD.pack(FOOTER, _FOOTER.size) + struct.pack("<QQ", start, 0)
     footer = Record(FOOTER, _FOOTER.pack(start, 0, zlib.crc32(summary + head) if summary else 0))
-    return MAGIC + data + summary + footer.bytes() + MAGIC
+    return MAGIC + data + summary + footer.packed() + MAGIC
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ _NAMES = (
     b"\xff\xfe\xfd",
     b"x" * 100_000,
     b"%s%n{0}",
-    "frame‮ gnp".encode(),
+    "frame\u202egnp".encode(),
     b"merged",
 )
 

@@ -42,6 +42,8 @@ class Expected:
         What came of the undamaged recording, if it holds just these messages; None if it does not.
     main
         Name of the recording, which an error must mention.
+    robots
+        Names of the robots, which an error that is about them must mention.
     is_checked
         Whether checksums protect the messages.
     leaves_no_trace
@@ -51,6 +53,7 @@ class Expected:
     messages: frozenset[Used]
     merged: tuple[str, ...] | None
     main: str
+    robots: tuple[str, ...]
     is_checked: bool
     leaves_no_trace: bool = False
 
@@ -72,16 +75,18 @@ def judge(ran: Ran, expected: Expected) -> Judged:
     if ran.program:
         return Judged(Verdict.WRONG, f"the command line: {ran.program}")
     if ran.error:
-        return _judge_error(ran.error, expected)
+        return _judge_error(ran, expected)
     if ran.misplaced:
         return Judged(Verdict.WRONG, "; ".join(ran.misplaced))
     return _judge_messages(ran, expected)
 
 
-def _judge_error(line: str, expected: Expected) -> Judged:
+def _judge_error(ran: Ran, expected: Expected) -> Judged:
+    line = ran.error
     if len(line.splitlines()) != 1 or not line.isprintable():
         return Judged(Verdict.WRONG, f"the error is not one line of text: {line!r}")
-    if expected.main not in line:
+    # What is about robots names them: the recording can be read, and it is they that do not fit.
+    if expected.main not in line and not (ran.is_usage and any(name in line for name in expected.robots)):
         return Judged(Verdict.WRONG, f"the error does not name the recording: {line}")
     return Judged(Verdict.ERROR, line)
 
@@ -90,6 +95,7 @@ def _judge_messages(ran: Ran, expected: Expected) -> Judged:
     used = set(ran.used)
     foreign, missing = sorted(used - expected.messages), sorted(expected.messages - used)
     said = f"; it said {ran.named}" if ran.named else ""
+    said += f"; {ran.unused} are of no robot" if ran.unused else ""
     if foreign and expected.is_checked:
         return Judged(Verdict.WRONG, f"used and not recorded so, though a checksum tells: {foreign}{said}")
     silent = len(missing) - len(foreign) - _most_named(ran)
@@ -107,5 +113,5 @@ def _judge_messages(ran: Ran, expected: Expected) -> Judged:
 
 def _most_named(ran: Ran) -> float:
     """Return how many messages may be among what was named: any number where that cannot be told."""
-    counts = [each.messages for each in ran.named]
+    counts = [ran.unused, *(each.messages for each in ran.named)]
     return float("inf") if None in counts else sum(count for count in counts if count is not None)

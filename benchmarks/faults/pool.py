@@ -1,4 +1,4 @@
-"""Processes that run cases: one that dies, or takes too long, is the outcome of its case, and another takes its place."""
+"""Processes that run cases. One that dies, or takes too long, is the outcome of its case; another takes its place."""
 
 from __future__ import annotations
 

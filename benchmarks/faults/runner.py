@@ -12,13 +12,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 from benchmarks.faults.placement import misplaced
 from benchmarks.faults.remembered import RememberingMerger
 from mapmerge.config import MergeConfig
 from replay import pipeline
 from replay.arrivals import Feed
-from replay.errors import ReplayError
+from replay.errors import ReplayError, UsageError
 from replay.events import Merged, Skipped
 from replay.options import RunOptions
 from replay.plan import Plan, open_plan
@@ -65,6 +66,8 @@ class Ran:
     ----------
     error
         The line of the error that it ended with; "" if none.
+    is_usage
+        Whether that is about robots and flags, which it names, rather than about a file.
     crash
         What it ended with otherwise: a traceback, or how the process died; "" if it did not.
     hung
@@ -73,6 +76,8 @@ class Ran:
         The messages that were used.
     named
         What was said not to be used.
+    unused
+        How many messages are on map topics that were said to be no robot's.
     misplaced
         Maps that were placed where they do not lie, in words.
     merged
@@ -82,10 +87,12 @@ class Ran:
     """
 
     error: str = ""
+    is_usage: bool = False
     crash: str = ""
     hung: bool = False
     used: tuple[Used, ...] = ()
     named: tuple[Named, ...] = ()
+    unused: int = 0
     misplaced: tuple[str, ...] = ()
     merged: tuple[str, ...] = ()
     program: str = ""
@@ -96,7 +103,7 @@ def run(path: Path, *, program: bool = False) -> Ran:
     try:
         ran = _replayed(path)
     except ReplayError as error:
-        ran = Ran(error=str(error))
+        ran = Ran(error=str(error), is_usage=isinstance(error, UsageError))
     except Exception:  # noqa: BLE001 - whatever else comes is what is looked for
         ran = Ran(crash=traceback.format_exc())
     return replace(ran, program=_by_command_line(path, ran)) if program and not ran.crash else ran
@@ -109,15 +116,22 @@ def _replayed(path: Path) -> Ran:
     last: Merged | None = None
     options = _options(path)
     with _remembering() as mergers, open_plan(options) as plan:
+        unused = _unused(plan)
         for event in pipeline.events(_watched(plan, seen), options):
             if isinstance(event, Skipped):
                 named.append(Named.of(event))
             elif isinstance(event, Merged):
                 last = event
                 wrong.update(dict.fromkeys(misplaced(event, mergers[-1].latest)))
-    unused = {(each.topic, each.log_time_ns) for each in named if not each.place}
-    used = tuple(Used.of(raw) for raw in seen if (raw.topic, raw.log_time_ns) not in unused)
-    return Ran(used=used, named=tuple(named), misplaced=tuple(wrong), merged=_merged(last))
+    skipped = {(each.topic, each.log_time_ns) for each in named if not each.place}
+    used = tuple(Used.of(raw) for raw in seen if (raw.topic, raw.log_time_ns) not in skipped)
+    return Ran(used=used, named=tuple(named), unused=unused, misplaced=tuple(wrong), merged=_merged(last))
+
+
+def _unused(plan: Plan) -> int:
+    """Return how many messages are on map topics that the terminal says are not used."""
+    names = plan.unused_topics()
+    return sum(topic.message_count for info in plan.infos for topic in info.topics if topic.name in names)
 
 
 def _options(path: Path) -> RunOptions:
@@ -151,7 +165,7 @@ class _WatchedSource:
 
 def _watched(plan: Plan, seen: list[RawMessage]) -> Plan:
     def watched(feed: Feed) -> Feed:
-        return replace(feed, source=_WatchedSource(feed.source, seen))  # type: ignore[arg-type]
+        return replace(feed, source=_WatchedSource(feed.source, seen))
 
     return replace(plan, feeds=tuple(map(watched, plan.feeds)))
 
@@ -160,17 +174,13 @@ def _watched(plan: Plan, seen: list[RawMessage]) -> Plan:
 def _remembering() -> Iterator[list[RememberingMerger]]:
     """Let runs take a merger that remembers; yields those that they took."""
     made: list[RememberingMerger] = []
-    original = pipeline.Merger
 
     def new(robots: list[str], config: MergeConfig, mapped: Any = map) -> RememberingMerger:  # noqa: ANN401
         made.append(RememberingMerger(robots, config, mapped))
         return made[-1]
 
-    pipeline.Merger = new  # type: ignore[misc, assignment]
-    try:
+    with patch.object(pipeline, "Merger", new):
         yield made
-    finally:
-        pipeline.Merger = original  # type: ignore[misc]
 
 
 def _by_command_line(path: Path, expected: Ran) -> str:

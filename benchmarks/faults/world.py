@@ -106,7 +106,7 @@ def map_content(grid: Grid, stamp_ns: int) -> MapContent:
 
 def changed(message: Message, **fields: object) -> Message:
     """Return a message whose content says something else."""
-    return replace(message, content=replace(message.content, **fields))  # type: ignore[type-var, arg-type]
+    return replace(message, content=replace(message.content, **fields))  # type: ignore[type-var]
 
 
 def indices_of_maps(recorded: Sequence[Message]) -> list[int]:
