@@ -308,6 +308,9 @@ class MergeConfig(Settings):
         resolutions is estimated as well (``free``).
     scale_range
         Least and largest factor by which the ratio of resolutions may be wrong, with ``free``.
+    max_canvas_cells
+        A placement at which the merged map would have more cells is refused: maps of few cells may lie far apart, or
+        have cells of very different sizes.
     moved_m, moved_rad
         A placement that changed by more than one of these since it was last reported has moved.
     """
@@ -323,6 +326,7 @@ class MergeConfig(Settings):
     watch: WatchConfig = field(default_factory=WatchConfig)
     paper: PaperConfig = field(default_factory=PaperConfig)
     existing: ExistingConfig = field(default_factory=ExistingConfig)
+    max_canvas_cells: int = 1_000_000_000
     moved_m: float = 0.10
     moved_rad: float = math.radians(0.5)
 

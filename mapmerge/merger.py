@@ -15,9 +15,10 @@ import numpy as np
 from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError
 from mapmerge.evidence import Evidence
+from mapmerge.extents import Extent, first_too_large
 from mapmerge.fuse import Canvas, Fusion
 from mapmerge.graph import Edge, Forest, place
-from mapmerge.grid import UNKNOWN, Grid
+from mapmerge.grid import MAX_SIDE_CELLS, UNKNOWN, Grid
 from mapmerge.jump import jump
 from mapmerge.lattice import changed_box, offset_cells
 from mapmerge.match import Match, load_matcher
@@ -28,7 +29,7 @@ from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2
 from mapmerge.unions import Robots, Unions
-from mapmerge.unite import united
+from mapmerge.unite import components, united
 from mapmerge.warp import Layer
 from mapmerge.watch import Trigger
 
@@ -212,17 +213,47 @@ class Merger:
 
     def _linked(self, believed: Mapping[Pair, Prior]) -> tuple[dict[Pair, Match], Forest]:
         """Place robots by the matches of pairs, then those that only merged maps can place, one after the other."""
-        alone = self._pairs.matches
+        alone = dict(self._pairs.matches)
         matches = dict(alone)
         centres_m = {robot: self._known[robot].centre_m for robot in self._maps}
-        forest = _placed(centres_m, matches, self._config)
+        forest = self._placed(centres_m, alone, matches)
         self._of_merged_maps.clear()
         while link := united(forest, self._maps, alone, believed, self._unions, self._config):
             matches[link.pair] = link.match
             if link.merged is not None:
                 self._of_merged_maps[link.pair] = link.merged
-            forest = _placed(centres_m, matches, self._config)
+            forest = self._placed(centres_m, alone, matches)
+            if matches[link.pair].reason.code is ReasonCode.TOO_LARGE:
+                break  # it would be found again
         return matches, forest
+
+    def _placed(
+        self, centres_m: Mapping[str, tuple[float, float]], alone: dict[Pair, Match], matches: dict[Pair, Match]
+    ) -> Forest:
+        """Place robots; refuse those matches, also among those of pairs alone, with which a merged map is too large."""
+        forest = _placed(centres_m, matches, self._config)
+        while too_large := self._too_large(forest):
+            robot, extent = too_large
+            via = forest.placements[robot].via
+            pair = next(pair for pair in matches if set(pair) == {robot, via})
+            cols, rows = extent.sides_cells
+            message = (
+                f"placed there, the merged map would have {cols} × {rows} cells; "
+                f"at most {self._config.max_canvas_cells}, and {MAX_SIDE_CELLS} a side, are made"
+            )
+            refused = replace(matches[pair], accepted=False, reason=Reason(ReasonCode.TOO_LARGE, message))
+            matches[pair] = alone[pair] = refused
+            forest = _placed(centres_m, matches, self._config)
+        return forest
+
+    def _too_large(self, forest: Forest) -> tuple[str, Extent] | None:
+        """Return a robot that makes the merged map of those linked with it too large; None if there is none."""
+        for robots in components(forest).values():
+            placed = [(robot, forest.placements[robot].component_from_map) for robot in robots]
+            found = first_too_large(self._maps, placed, self._config.max_canvas_cells)
+            if found is not None:
+                return found
+        return None
 
     def _fused(self, layers: Mapping[str, Layer], lattice: Grid | None, changed: Mapping[str, Box]) -> Fusion | None:
         if not layers or lattice is None:

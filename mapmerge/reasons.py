@@ -35,6 +35,8 @@ class ReasonCode(StrEnum):
     """The maps do not fit where the placement was said to be, but elsewhere."""
     INCONSISTENT = "inconsistent"
     """The pair fits by itself, but contradicts better placements of the same robots."""
+    TOO_LARGE = "too_large"
+    """Placed there, the merged map would be larger than it may be."""
     MAP_JUMPED = "map_jumped"
     """The map contradicts what it was before, or forgot it: of a map, not of its placement."""
     OTHER_COMPONENT = "other_component"

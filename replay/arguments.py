@@ -199,6 +199,12 @@ def _output_arguments(parser: argparse.ArgumentParser) -> None:
         help="threads that work at once, for reading, matching and writing; outputs are the same (default: one for "
         "each processor)",
     )
+    rules.add_argument(
+        "--max-memory",
+        metavar="SIZE",
+        help="skip maps, and refuse placements, for which a robot's map or the merged map would need more memory than "
+        "this, such as 2GiB or 500MB (default: any map, and merged maps of up to 10⁹ cells)",
+    )
     rules.add_argument("--strict", action="store_true", help="end with an error at the first message that is unusable")
     rules.add_argument(
         "--require-all", action="store_true", help="exit with 1 unless two robots or more were merged, all"
@@ -231,6 +237,7 @@ def _placing_options(options: argparse.Namespace) -> dict[str, Any]:
     from mapmerge.config import MergeConfig, VerifyConfig
     from mapmerge.errors import ConfigError
     from mapmerge.match import MATCHERS
+    from replay.footprint import size_to_bytes
     from replay.init_pose import InitPose
 
     if options.method not in MATCHERS:
@@ -245,6 +252,7 @@ def _placing_options(options: argparse.Namespace) -> dict[str, Any]:
         "use_tf": options.use_tf,
         "merge": merge,
         "jobs": _jobs(options.jobs),
+        "max_memory_bytes": size_to_bytes(options.max_memory) if options.max_memory is not None else None,
     }
 
 

@@ -16,12 +16,15 @@ from replay.assemble import assemble
 from replay.clocks import stamp_ns
 from replay.codec import decode, decode_transforms
 from replay.errors import BadMessage
-from replay.events import Clock, Skipped
+from replay.events import Clock, Noted, Skipped
+from replay.footprint import MemoryLimit
 from replay.messages import GridMessage, TransformMessage, UpdateMessage
 from replay.skip_cause import SkipCause
-from replay.sources.base import TF_TYPES, RawMessage, Source
+from replay.sources.base import GRID_TYPE, TF_TYPES, RawMessage, Source
+from replay.stamps import Stamp, StampCheck
+from replay.words import moment
 
-Content = GridMessage | UpdateMessage | TransformMessage | Skipped
+Content = GridMessage | UpdateMessage | TransformMessage | Skipped | Noted
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +41,10 @@ class Feed:
         Added to each topic's times.
     untimed_ns
         Time given to saved maps, which have none, and to transforms that hold always.
+    leads_ns
+        How far the stamps of topics are ahead of the recorder's clock when they begin, where that is known.
+    memory
+        A map that needs more is not used; None for any.
     """
 
     source: Source
@@ -45,6 +52,8 @@ class Feed:
     clocks: Mapping[str, Clock]
     offsets_ns: Mapping[str, int]
     untimed_ns: int
+    leads_ns: Mapping[str, int] = field(default_factory=dict)
+    memory: MemoryLimit | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +74,7 @@ class Tally:
 
     messages: int = 0
     late: int = 0
+    bad_stamps: int = 0
     until_ns: int | None = None
     digest: hashlib._Hash = field(default_factory=hashlib.sha256)
 
@@ -89,6 +99,15 @@ class Arrival:
     def robot(self) -> str:
         """Whose map it is; "" if it is none."""
         return self.feed.robot_of.get(self.raw.topic, "")
+
+    @property
+    def loses_map_of(self) -> frozenset[str]:
+        """Whose full map may be lost with it, so that no update belongs to the one before."""
+        if not isinstance(self.content, Skipped):
+            return frozenset()
+        if self.raw.msgtype == GRID_TYPE:
+            return frozenset([self.robot])
+        return frozenset() if self.content.topic or not self.content.place else frozenset(self.feed.robot_of.values())
 
     def skipped(self, error: BadMessage) -> Skipped:
         """Return why the message, or a part of it, is not used after all."""
@@ -125,10 +144,13 @@ def _stamped(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
         yield from _lost(feed, raw.log_time_ns, times.newest_ns)
         content = _decoded(feed, raw)
         time_ns = times.of(raw, content)
+        yield from (Arrival(time_ns, feed, raw, note) for note in times.new_notes())
         early = window.start_ns is not None and time_ns < window.start_ns
         if early and isinstance(content, GridMessage | UpdateMessage):
             tally.count(raw)
             before.take(Arrival(time_ns, feed, raw, content), content)
+        elif early and raw.msgtype == GRID_TYPE:
+            before.lose(feed.robot_of[raw.topic])
         unwanted = early and not isinstance(content, TransformMessage)
         if unwanted or (window.stop_ns is not None and time_ns >= window.stop_ns):
             continue
@@ -150,7 +172,12 @@ def _lost(feed: Feed, log_time_ns: int, time_ns: int) -> Iterator[Arrival]:
 
 def _decoded(feed: Feed, raw: RawMessage) -> Content:
     try:
-        return decode_transforms(raw) if raw.msgtype in TF_TYPES else decode(raw)
+        if raw.msgtype in TF_TYPES:
+            return decode_transforms(raw)
+        message = decode(raw)
+        if feed.memory is not None and isinstance(message, GridMessage):
+            feed.memory.refuse_over(message.grid)
+        return message
     except BadMessage as error:
         return _skipped(feed, raw, error)
 
@@ -158,14 +185,18 @@ def _decoded(feed: Feed, raw: RawMessage) -> Content:
 class _Times:
     """Gives the messages of a recording their times.
 
-    Where a message does not say, because it cannot be decoded or its header has no time, it is its log time, shifted as
-    that of the message before it on its topic was; without one, the newest time so far.
+    Where a message does not say, because it cannot be decoded or its header has no time, or one that cannot be believed
+    (see `replay.stamps`), it is its log time, shifted as that of the message before it on its topic was; without one,
+    the newest time so far.
     """
 
     def __init__(self, feed: Feed, tally: Tally) -> None:
         self._feed = feed
         self._tally = tally
-        self._leads_ns: dict[str, int] = {}
+        self._leads_ns = {topic: lead_ns + feed.offsets_ns[topic] for topic, lead_ns in feed.leads_ns.items()}
+        self._checks = {topic: StampCheck(feed.leads_ns.get(topic)) for topic in feed.clocks}
+        self._doubted: set[str] = set()
+        self._notes: list[Noted] = []
         self.newest_ns = feed.untimed_ns
 
     def of(self, raw: RawMessage, content: Content) -> int:
@@ -175,13 +206,36 @@ class _Times:
             return self._feed.untimed_ns
         if isinstance(content, TransformMessage) and content.stamp_ns <= 0:
             time_ns = max(0, raw.log_time_ns + self._feed.offsets_ns[raw.topic])
-        elif isinstance(content, Skipped) or (clock == "header" and content.stamp_ns <= 0):
+        elif isinstance(content, Skipped | Noted) or (clock == "header" and not self._believes(raw, content.stamp_ns)):
             time_ns = self._guessed(raw)
         else:
             time_ns = max(0, stamp_ns(clock, raw, content) + self._feed.offsets_ns[raw.topic])
             self._leads_ns[raw.topic] = time_ns - raw.log_time_ns
         self.newest_ns = max(self.newest_ns, time_ns)
         return time_ns
+
+    def new_notes(self) -> list[Noted]:
+        """Return what is to be said of the times that were given since this was asked last."""
+        notes, self._notes = self._notes, []
+        return notes
+
+    def _believes(self, raw: RawMessage, own_ns: int) -> bool:
+        """Tell whether a header has a time that can be believed; note the first on each topic that cannot."""
+        if own_ns <= 0:
+            return False
+        stamp = Stamp(own_ns, raw.log_time_ns)
+        if self._checks[raw.topic].believes(stamp):
+            return True
+        self._tally.bad_stamps += 1
+        if raw.topic not in self._doubted:
+            self._doubted.add(raw.topic)
+            where = f"{self._feed.source.path.name}: {raw.topic} at {raw.log_time_ns} ns"
+            message = (
+                f"{where}: the header says {moment(stamp.own_ns)}, far from those around it: "
+                "such a message is taken at the time at which it was recorded"
+            )
+            self._notes.append(Noted(self._feed.robot_of.get(raw.topic, ""), message))
+        return False
 
     def _guessed(self, raw: RawMessage) -> int:
         if raw.topic in self._leads_ns:
@@ -195,6 +249,11 @@ class _Before:
 
     def __init__(self) -> None:
         self._last: dict[str, tuple[Arrival, Grid]] = {}
+        self._lost: set[str] = set()
+
+    def lose(self, robot: str) -> None:
+        """Take note that a full map is lost: no update belongs to the one that is kept."""
+        self._lost.add(robot)
 
     def take(self, arrival: Arrival, content: GridMessage | UpdateMessage) -> None:
         """Keep a map, or an update of the one that is kept; what cannot be used is left out, as all of that time is."""
@@ -203,9 +262,10 @@ class _Before:
         if older and isinstance(content, GridMessage):
             return
         try:
-            grid = assemble(kept[1] if kept else None, content)
+            grid = assemble(kept[1] if kept and arrival.robot not in self._lost else None, content)
         except BadMessage:
             return
+        self._lost.discard(arrival.robot)
         self._last[arrival.robot] = arrival, grid
 
     def release(self, start_ns: int | None) -> Iterator[Arrival]:

@@ -27,7 +27,7 @@ def assemble(last: Grid | None, message: GridMessage | UpdateMessage) -> Grid:
         return message.grid
     rows, cols = message.cells.shape
     if last is None:
-        detail = f"an update of {cols} × {rows} cells came before any full map"
+        detail = f"an update of {cols} × {rows} cells came before any full map, or after one that is lost"
         raise BadMessage(SkipCause.UPDATE_BEFORE_GRID, detail)
     if message.row < 0 or message.col < 0 or message.row + rows > last.rows or message.col + cols > last.cols:
         detail = (

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from itertools import islice
 
 from replay.codec import decode
 from replay.errors import BadMessage, UsageError
@@ -13,6 +14,7 @@ from replay.events import Clock
 from replay.messages import GridMessage, TransformMessage, UpdateMessage
 from replay.options import NS_PER_S, ClockChoice
 from replay.sources.base import RawMessage, Source
+from replay.stamps import PROBED, Stamp, is_plain, lead_at_start_ns
 
 _MAX_GAP_NS = 86_400 * NS_PER_S
 
@@ -31,6 +33,8 @@ class Probe:
         The same by the recorder's clock.
     frame_id
         Its map frame as recorded.
+    lead_ns
+        How far its headers' times are ahead of the recorder's clock then; None if they are not used.
     """
 
     robot: str
@@ -42,30 +46,52 @@ class Probe:
     first_log_ns: int
     last_log_ns: int
     frame_id: str
+    lead_ns: int | None = None
 
     def by_log(self) -> Probe:
         """Return the same by the recorder's clock; saved maps stay without one."""
         if self.clock != "header":
             return self
-        return replace(self, clock="log", first_ns=self.first_log_ns, last_ns=self.last_log_ns)
+        return replace(self, clock="log", first_ns=self.first_log_ns, last_ns=self.last_log_ns, lead_ns=None)
 
 
 def probe(source: Source, index: int, robot: str, topic: str, choice: ClockChoice) -> Probe | None:
-    """Read the first usable message of a topic; None if there is none."""
+    """Read the first usable message of a topic; None if there is none.
+
+    Of the headers' times that follow, a few are looked at where the first one is far from the recorder's clock: it may
+    be the only one that is, or all are.
+    """
     info = source.info
+    usable = _usable(source, topic)
+    raw, message = next(usable, (None, None))
+    if raw is None or message is None:
+        return None
+    log_ns, frame = raw.log_time_ns, message.frame_id
+    if info.start_ns is None or info.stop_ns is None:
+        return Probe(robot, index, topic, "none", None, None, log_ns, log_ns, frame)
+    last_log_ns = max(log_ns, info.stop_ns)
+    if choice == "log" or message.stamp_ns <= 0:
+        return Probe(robot, index, topic, "log", log_ns, last_log_ns, log_ns, last_log_ns, frame)
+    first = Stamp(message.stamp_ns, log_ns)
+    lead_ns = first.lead_ns if is_plain(first) else lead_at_start_ns([first, *_next_stamps(usable)])
+    supposed = Stamp(log_ns + lead_ns, log_ns)
+    first_ns = first.own_ns if first.may_follow(supposed) else max(0, supposed.own_ns)
+    last_ns = first_ns + last_log_ns - log_ns
+    return Probe(robot, index, topic, "header", first_ns, last_ns, log_ns, last_log_ns, frame, lead_ns)
+
+
+def _usable(source: Source, topic: str) -> Iterator[tuple[RawMessage, GridMessage | UpdateMessage]]:
     for raw in source.messages([topic]):
         try:
-            message = decode(raw)
+            yield raw, decode(raw)
         except BadMessage:
             continue
-        log_ns, frame = raw.log_time_ns, message.frame_id
-        if info.start_ns is None or info.stop_ns is None:
-            return Probe(robot, index, topic, "none", None, None, log_ns, log_ns, frame)
-        clock: Clock = "header" if choice == "header" and message.stamp_ns > 0 else "log"
-        first_ns = stamp_ns(clock, raw, message)
-        last_log_ns = max(log_ns, info.stop_ns)
-        return Probe(robot, index, topic, clock, first_ns, first_ns + last_log_ns - log_ns, log_ns, last_log_ns, frame)
-    return None
+
+
+def _next_stamps(usable: Iterator[tuple[RawMessage, GridMessage | UpdateMessage]]) -> list[Stamp]:
+    """Return the times of the next few messages that have one."""
+    stamps = (Stamp(message.stamp_ns, raw.log_time_ns) for raw, message in usable if message.stamp_ns > 0)
+    return list(islice(stamps, PROBED - 1))
 
 
 def stamp_ns(clock: Clock, raw: RawMessage, message: GridMessage | UpdateMessage | TransformMessage) -> int:

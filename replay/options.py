@@ -96,6 +96,10 @@ class RunOptions:
         Whether recorded transforms between map frames say so, for robots without such a pose.
     merge
         Settings of the merger.
+    max_memory_bytes
+        The most memory that one robot's map, or the merged map, may need; None for what `MergeConfig` allows. A map
+        that needs more is not used. It affects results, but is no setting of a machine: the same limit gives the same
+        outcome everywhere.
     jobs
         How many threads work at once: more than one read ahead, match pairs and write beside the merging. The outcome
         is the same.
@@ -114,6 +118,7 @@ class RunOptions:
     init_poses: tuple[InitPose, ...] = ()
     use_tf: bool = False
     merge: MergeConfig = field(default_factory=MergeConfig)
+    max_memory_bytes: int | None = None
     jobs: int = 1
 
     def settings(self) -> Mapping[str, Any]:
@@ -127,6 +132,7 @@ class RunOptions:
             "topics": [asdict(choice) for choice in self.topics],
             "init_poses": [asdict(item) for item in self.init_poses],
             "use_tf": self.use_tf,
+            "max_memory_bytes": self.max_memory_bytes,
             "merge": _plain(asdict(self.merge)),
         }
 

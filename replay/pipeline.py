@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from dataclasses import replace
 from time import perf_counter
 
+from mapmerge.config import MergeConfig
 from mapmerge.errors import MapMergeError
 from mapmerge.merger import Merger
 from mapmerge.prior import Prior
@@ -18,7 +20,7 @@ from replay.errors import InputError
 from replay.events import Event, Finished, Merged, Noted, Skipped, Started, Timing
 from replay.gallery import Gallery
 from replay.options import RunOptions
-from replay.plan import Plan, open_plan
+from replay.plan import Plan, memory_limit, open_plan
 from replay.report import ReportBuilder
 from replay.sinks.base import Sink
 from replay.timeline import Transforms, ticks
@@ -41,11 +43,14 @@ def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
         read = ticks(feeds, tallies, plan.window, strict=options.strict)
         items = stack.enter_context(ReadAhead(read)) if options.jobs > 1 else read
         mapped = stack.enter_context(ThreadPoolExecutor(options.jobs)).map if options.jobs > 1 else map
-        merger = Merger([item.robot for item in plan.robots], options.merge, mapped)
+        merger = Merger([item.robot for item in plan.robots], merge_config(options), mapped)
         gallery = Gallery(options.images, merger.explain)
         for tick in items:
             if isinstance(tick, Transforms):
                 beliefs.take(tick)
+                continue
+            if isinstance(tick, Noted):
+                yield from _noted(report, [tick])
                 continue
             if isinstance(tick, Skipped):
                 report.skip(tick)
@@ -68,6 +73,14 @@ def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
             yield Merged(stamp_ns, result, report.build(stamp_ns, result, inputs), pictures, timing, done, total)
     yield from _noted(report, beliefs.missed())
     yield Finished(report.build(stamp_ns, merger.result, plan.describe_inputs(tallies)))
+
+
+def merge_config(options: RunOptions) -> MergeConfig:
+    """Return the settings of the merger, for the memory that there may be."""
+    limit = memory_limit(options)
+    if limit is None:
+        return options.merge
+    return replace(options.merge, max_canvas_cells=min(limit.canvas_cells, options.merge.max_canvas_cells))
 
 
 def _noted(report: ReportBuilder, notes: Iterable[Noted]) -> Iterator[Noted]:

@@ -12,6 +12,7 @@ from replay.arrivals import Feed, Tally, Window
 from replay.clocks import Probe, agreed, frames, offsets_ns, probe, refuse_recorded_twice
 from replay.errors import UsageError
 from replay.events import Clock, RobotInput
+from replay.footprint import MemoryLimit
 from replay.init_pose import refuse_unfit
 from replay.options import NS_PER_S, RunOptions
 from replay.selection import Selected, select
@@ -88,6 +89,7 @@ class Plan:
                 **_read(tally),
                 "until_ns": tally.until_ns if tally else None,
                 "late": tally.late if tally else None,
+                "bad_stamps": tally.bad_stamps if tally else None,
                 "transforms": {
                     topic: _read(taken)
                     for each, taken in transforms
@@ -104,6 +106,11 @@ def _read(tally: Tally | None) -> dict[str, Any]:
         "messages": tally.messages if tally else None,
         "sha256": tally.digest.hexdigest() if tally else None,
     }
+
+
+def memory_limit(options: RunOptions) -> MemoryLimit | None:
+    """Return how much memory one map may need; None for any."""
+    return None if options.max_memory_bytes is None else MemoryLimit(options.max_memory_bytes, options.merge)
 
 
 @contextmanager
@@ -141,7 +148,7 @@ def _plan(sources: list[Source], options: RunOptions) -> Plan:
     return Plan(
         infos,
         _robots(selected, probes, infos, frame_ids),
-        _feeds(sources, selected, probes, offsets, untimed_ns),
+        _feeds(sources, selected, probes, offsets, untimed_ns, memory_limit(options)),
         window,
         {item.robot: _bare(frame_ids.get(item.robot)) for item in selected},
         transform_feeds(sources, probes, offsets, options.clock) if options.use_tf else None,
@@ -231,8 +238,10 @@ def _feeds(
     probes: list[Probe],
     offsets: Mapping[tuple[int, str], int],
     untimed_ns: int,
+    memory: MemoryLimit | None,
 ) -> tuple[Feed, ...]:
     clocks = {(item.input, item.topic): item.clock for item in probes}
+    leads_ns = {(item.input, item.topic): item.lead_ns for item in probes}
     feeds = []
     for index, source in enumerate(sources):
         robot_of = {
@@ -249,6 +258,10 @@ def _feeds(
                 clocks={topic: clocks.get((index, topic), "header") for topic in robot_of},
                 offsets_ns={topic: offsets.get((index, topic), 0) for topic in robot_of},
                 untimed_ns=untimed_ns,
+                leads_ns={
+                    topic: lead_ns for topic in robot_of if (lead_ns := leads_ns.get((index, topic))) is not None
+                },
+                memory=memory,
             )
         )
     return tuple(feeds)

@@ -9,6 +9,8 @@ from mapmerge.sim2 import Sim2
 
 MAX_TILT_RAD = math.radians(5.0)
 """What is tilted by more is no pose in the plane."""
+MAX_PLACE_M = 1e8
+"""Twice around the earth: nothing is farther away, and up to there a place is known to less than a micrometre."""
 
 
 @dataclass(frozen=True, slots=True)

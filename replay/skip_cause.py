@@ -26,8 +26,6 @@ class SkipCause(StrEnum):
     """An update of a part that is not within the last full map."""
     BAD_TRANSFORM = "bad_transform"
     """A transform in it has no finite shift, no rotation, or not two frames; the others in it are used."""
-    BAD_STAMP = "bad_stamp"
-    """Its header's time is far from those around it: it is taken at the time at which it was recorded."""
     OVER_MEMORY = "over_memory"
     """It would need more memory than --max-memory allows."""
     ENDS_EARLY = "ends_early"

@@ -11,7 +11,7 @@ from mapmerge.grid import Grid
 from replay.arrivals import Arrival, Feed, Tally, Window, in_order
 from replay.assemble import assemble
 from replay.errors import BadMessage, InputError
-from replay.events import Skipped
+from replay.events import Noted, Skipped
 from replay.messages import FrameLink, TransformMessage
 from replay.skip_cause import SkipCause
 from replay.sources.base import Source
@@ -48,7 +48,7 @@ class Transforms:
 
 def ticks(
     feeds: Sequence[Feed], tallies: Sequence[Tally], window: Window, *, strict: bool
-) -> Iterator[Tick | Skipped | Transforms]:
+) -> Iterator[Tick | Skipped | Noted | Transforms]:
     """Yield what the recordings say, in order of time; of one time, transforms before the tick.
 
     The last tick says that it is the last, so that one is held back until the next one is read. If too much else comes
@@ -67,7 +67,7 @@ def ticks(
         If a recording cannot be read or, with ``strict``, a message cannot be used.
     """
     last: Tick | None = None
-    held: list[Tick | Skipped | Transforms] = []
+    held: list[Tick | Skipped | Noted | Transforms] = []
     for item in _items(feeds, tallies, window, strict=strict):
         if isinstance(item, Tick) or len(held) >= _MOST_HELD:
             yield from held
@@ -86,7 +86,7 @@ def ticks(
 
 def _items(
     feeds: Sequence[Feed], tallies: Sequence[Tally], window: Window, *, strict: bool
-) -> Iterator[Tick | Skipped | Transforms]:
+) -> Iterator[Tick | Skipped | Noted | Transforms]:
     streams = [in_order(feed, tally, window) for feed, tally in zip(feeds, tallies, strict=True)]
     latest: dict[str, Grid] = {}
     messages = 0
@@ -99,7 +99,7 @@ def _items(
                         f"{item.input}: {item.where}: {item.detail}; without --strict it would be skipped and counted"
                     )
                 yield item
-            messages += arrival.robot != ""
+            messages += arrival.robot != "" and not isinstance(arrival.content, Noted)
         if changed:
             yield Tick(time_ns, changed, messages)
             messages = 0
@@ -109,10 +109,14 @@ def _stamp(arrival: Arrival) -> int:
     return arrival.stamp_ns
 
 
-def _taken(arrival: Arrival, latest: dict[str, Grid], changed: dict[str, Grid]) -> Iterator[Skipped | Transforms]:
+def _taken(
+    arrival: Arrival, latest: dict[str, Grid], changed: dict[str, Grid]
+) -> Iterator[Skipped | Noted | Transforms]:
     """Apply a message to the latest maps; yield its transforms, or why it was not used."""
     content = arrival.content
-    if isinstance(content, Skipped):
+    for robot in arrival.loses_map_of:
+        latest.pop(robot, None)
+    if isinstance(content, Skipped | Noted):
         yield content
     elif isinstance(content, TransformMessage):
         if content.bad:

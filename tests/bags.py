@@ -135,7 +135,7 @@ def _message(store: Any, message: Recorded, *, ros1: bool) -> Any:
     extra = {"seq": 5} if ros1 else {}
     if message.msgtype in TF_TYPES:
         return types[TF_TYPE]([_transform(types, extra, **link) for link in fields["links"]])
-    sec, nanosec = divmod(fields["stamp_ns"], SECOND)
+    sec, nanosec = fields.get("stamp") or divmod(fields["stamp_ns"], SECOND)
     header = types["std_msgs/msg/Header"](stamp=time(sec, nanosec), frame_id=fields["frame_id"], **extra)
     if message.msgtype == UPDATE_TYPE:
         rectangle = {key: fields[key] for key in ("x", "y", "width", "height", "data")}

@@ -23,6 +23,8 @@ from mapmerge.sim2 import Points, Sim2
 Floats = NDArray[np.float32]
 
 _ENOUGH_WALLS = 5_000
+_MOST_SQUARES = 2_048
+"""Of the field, a side: in a map of more than 1 km its squares are larger, so that memory is bounded."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,10 +101,11 @@ def _sample(prepared: PreparedMap) -> tuple[Points, float]:
 def _bent(target: PreparedMap, x: Floats, y: Floats, spacing_m: float, config: SlackConfig) -> _Field:
     """Return the smooth field of shifts that brings walls at these places, each so long, on the target's."""
     corner = float(x.min()), float(y.min())
-    cols = int((float(x.max()) - corner[0]) / config.cell_m) + 1
-    rows = int((float(y.max()) - corner[1]) / config.cell_m) + 1
+    sides_m = float(x.max()) - corner[0], float(y.max()) - corner[1]
+    cell_m = max(config.cell_m, max(sides_m) / _MOST_SQUARES)
+    cols, rows = (int(side_m / cell_m) + 1 for side_m in sides_m)
     still = np.zeros((rows, cols), np.float32)
-    field = _Field(still, still, corner, config.cell_m)
+    field = _Field(still, still, corner, cell_m)
     index = field.index(x, y)
     nearest = target.nearest
     for reach_m in config.reject_m:
@@ -118,7 +121,9 @@ def _bent(target: PreparedMap, x: Floats, y: Floats, spacing_m: float, config: S
         cos, sin = nearest.directions.take(wall[near], axis=0).T
         xx, xy, yy = 0.5 * weight * (1.0 - cos), -0.5 * weight * sin, 0.5 * weight * (1.0 + cos)
         asked = np.stack([xx, xy, yy, xx * error_x + xy * error_y, xy * error_x + yy * error_y], axis=1)
-        step_x, step_y = _solved(_spread(_summed(asked, index[near], (rows, cols)), config), config.stiffness_m)
+        step_x, step_y = _solved(
+            _spread(_summed(asked, index[near], (rows, cols)), config.length_m / cell_m), config.stiffness_m
+        )
         field = _limited(field, step_x, step_y, config.most_m)
     return field
 
@@ -131,9 +136,8 @@ def _summed(values: Floats, square: NDArray[np.intp], shape: tuple[int, int]) ->
     return sums.astype(np.float32).reshape(*shape, kinds)
 
 
-def _spread(values: Floats, config: SlackConfig) -> Floats:
+def _spread(values: Floats, sigma: float) -> Floats:
     """Return sums over the squares around each, near ones counting more."""
-    sigma = config.length_m / config.cell_m
     blurred = cv2.GaussianBlur(values, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT)
     return np.asarray(blurred * np.float32(2 * np.pi * sigma**2), np.float32)
 

@@ -12,13 +12,17 @@ from mapmerge.sim2 import Sim2
 from replay.codec.deserialize import deserialized, header_stamp_ns
 from replay.errors import BadMessage
 from replay.messages import GridMessage, UpdateMessage
-from replay.pose3 import MAX_TILT_RAD, Pose3
+from replay.pose3 import MAX_PLACE_M, MAX_TILT_RAD, Pose3
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, RawMessage
 
 if TYPE_CHECKING:
     from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Pose as Pose
     from rosbags.typesys.stores.ros2_jazzy import nav_msgs__msg__OccupancyGrid as OccupancyGrid
     from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Header as Header
+
+
+MIN_RESOLUTION_M, MAX_RESOLUTION_M = 1e-4, 10.0
+"""No map of a robot's surroundings has smaller or larger cells: what says so is damaged, or not in metres."""
 
 
 class _OccupancyGridUpdate(Protocol):
@@ -47,8 +51,8 @@ def decode(raw: RawMessage) -> GridMessage | UpdateMessage:
         - ``size_mismatch``: there are not width × height cells;
         - ``empty``: there is no cell;
         - ``too_large``: a side has over 100 000 cells;
-        - ``bad_resolution``: it is no positive number;
-        - ``bad_origin``: it is not finite, or not flat.
+        - ``bad_resolution``: it is no number of metres that a cell can have, see `MIN_RESOLUTION_M`;
+        - ``bad_origin``: it is not finite, not flat, or farther away than anything is, see `MAX_PLACE_M`.
     """
     if raw.msgtype not in {GRID_TYPE, UPDATE_TYPE}:
         raise BadMessage("undecodable", f"{raw.msgtype} is no map; {GRID_TYPE} or {UPDATE_TYPE} was expected")
@@ -61,9 +65,14 @@ def decode(raw: RawMessage) -> GridMessage | UpdateMessage:
 def _grid(message: OccupancyGrid) -> GridMessage:
     info = message.info
     cells = _cells(message.data, info.width, info.height)
-    if not (math.isfinite(info.resolution) and info.resolution > 0.0):
-        raise BadMessage("bad_resolution", f"the resolution is {info.resolution} m; a positive number was expected")
-    grid = Grid(cells, _shortest(info.resolution), _flat_pose(info.origin))
+    resolution_m = _shortest(info.resolution)
+    if not MIN_RESOLUTION_M <= resolution_m <= MAX_RESOLUTION_M:
+        raise BadMessage(
+            "bad_resolution",
+            f"the resolution is {resolution_m} m; a positive number was expected, {MIN_RESOLUTION_M:g} to "
+            f"{MAX_RESOLUTION_M:g}",
+        )
+    grid = Grid(cells, resolution_m, _flat_pose(info.origin))
     return GridMessage(header_stamp_ns(message.header), message.header.frame_id, grid)
 
 
@@ -107,6 +116,10 @@ def _flat_pose(pose: Pose) -> Sim2:
         placed = Pose3.of((position.x, position.y, position.z), (0.0, 0.0, 0.0, 1.0) if unset else quaternion)
     except ValueError as error:
         raise BadMessage("bad_origin", f"the origin is {_text(pose)}; {error}") from None
+    if max(abs(position.x), abs(position.y)) > MAX_PLACE_M:
+        raise BadMessage(
+            "bad_origin", f"the origin is {_text(pose)}; a place at most {MAX_PLACE_M:g} m away was expected"
+        )
     if placed.tilt_rad > MAX_TILT_RAD:
         raise BadMessage(
             "bad_origin",

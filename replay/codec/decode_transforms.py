@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Protocol, cast
 
 from replay.codec.deserialize import deserialized, header_stamp_ns
 from replay.messages import FrameLink, TransformMessage
-from replay.pose3 import Pose3
+from replay.pose3 import MAX_PLACE_M, Pose3
 from replay.sources.base import TF_TYPE, RawMessage
 
 if TYPE_CHECKING:
@@ -46,4 +46,7 @@ def _link(parent: str, child: str, item: TransformStamped) -> FrameLink:
     if not parent or not child or parent == child:
         raise ValueError("two frames with names of their own were expected")
     shift, turn = item.transform.translation, item.transform.rotation
-    return FrameLink(parent, child, Pose3.of((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w)))
+    pose = Pose3.of((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w))
+    if max(abs(shift.x), abs(shift.y), abs(shift.z)) > MAX_PLACE_M:
+        raise ValueError(f"its shift is ({shift.x}, {shift.y}, {shift.z}); at most {MAX_PLACE_M:g} m were expected")
+    return FrameLink(parent, child, pose)

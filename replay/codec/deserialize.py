@@ -39,5 +39,6 @@ def deserialized(raw: RawMessage, msgtype: str) -> object:
 
 
 def header_stamp_ns(header: Header) -> int:
-    """Return the time of a header; 0 if it was not set."""
-    return header.stamp.sec * _NS + header.stamp.nanosec
+    """Return the time of a header; 0 if it was not set, or is none: before 1970, or with a second of nanoseconds."""
+    stamp = header.stamp
+    return stamp.sec * _NS + stamp.nanosec if stamp.sec >= 0 and stamp.nanosec < _NS else 0

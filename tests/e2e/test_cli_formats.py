@@ -115,6 +115,7 @@ class TestInputs:
             "messages": 6,
             "until_ns": 1_700_000_022_000_000_000,
             "late": 0,
+            "bad_stamps": 0,
             "transforms": {},
         }
 

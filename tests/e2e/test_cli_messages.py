@@ -101,7 +101,6 @@ class TestBadMessages:
     def test_every_cause_is_tested(self) -> None:
         elsewhere = {SkipCause.UPDATE_BEFORE_GRID, SkipCause.UPDATE_OUTSIDE_GRID, SkipCause.BAD_TRANSFORM}
         of_recordings = {
-            SkipCause.BAD_STAMP,
             SkipCause.OVER_MEMORY,
             SkipCause.ENDS_EARLY,
             SkipCause.DAMAGED,

@@ -37,8 +37,25 @@ SAVED = Probe("old", 1, "/map", "none", None, None, 0, 0, "map")
 
 class TestProbe:
     def test_header(self) -> None:
-        found = probed([seen("r1", 5.0, stamp_ns=7 * SECOND, frame="/odom"), seen("r1", 25.0)])
-        assert found == Probe("r1", 3, "/r1/map", "header", 7 * SECOND, 27 * SECOND, at(5.0), at(25.0), "/odom")
+        messages = [seen("r1", 5.0, stamp_ns=7 * SECOND, frame="/odom"), seen("r1", 25.0, stamp_ns=27 * SECOND)]
+        lead_ns = 7 * SECOND - at(5.0)
+        expected = Probe("r1", 3, "/r1/map", "header", 7 * SECOND, 27 * SECOND, at(5.0), at(25.0), "/odom", lead_ns)
+        assert probed(messages) == expected
+
+    @pytest.mark.parametrize("off_s", [-4 * 365 * DAY_S, -7200, 7200, 10 * 365 * DAY_S])
+    @pytest.mark.parametrize("later", [1, 2, 5])
+    def test_a_first_stamp_that_is_far_from_the_next_is_not_believed(self, off_s: int, later: int) -> None:
+        wild = seen("r1", 5.0, stamp_ns=at(5.0) + off_s * SECOND)
+        found = probed([wild, *(seen("r1", 5.0 + 10.0 * number) for number in range(1, later + 1))])
+        assert found is not None
+        assert (found.clock, found.lead_ns, found.first_ns) == ("header", 0, at(5.0))
+
+    @pytest.mark.parametrize("rate", [0.1, 0.5, 1.0, 9.0])
+    def test_simulated_time_is_believed(self, rate: float) -> None:
+        messages = [seen("r1", 5.0 + 10.0 * n, stamp_ns=SECOND + round(10 * rate * n * SECOND)) for n in range(4)]
+        found = probed(messages)
+        assert found is not None
+        assert (found.clock, found.first_ns) == ("header", SECOND)
 
     @pytest.mark.parametrize("stamp_ns", [0, -SECOND])
     def test_log_where_the_header_has_no_time(self, stamp_ns: int) -> None:

@@ -34,6 +34,7 @@ INPUT: Mapping[str, Any] = {
     "messages": None,
     "until_ns": None,
     "late": None,
+    "bad_stamps": None,
     "sha256": None,
     "transforms": {},
 }

@@ -2,13 +2,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 
 from mapmerge.grid import Grid
 from replay.arrivals import Feed, Tally, Window
 from replay.errors import InputError
-from replay.events import Clock, Skipped
+from replay.events import Clock, Noted, Skipped
 from replay.timeline import _MOST_HELD, Tick, Transforms, ticks
 from tests.bags import SECOND, START, Recorded, as_cdr
 from tests.fakes import FakeSource
@@ -42,19 +43,21 @@ def transforms(*messages: Recorded, clock: Clock = "header", offset_ns: int = 0)
 
 def run(
     *feeds: Feed, window: Window = EVERYTHING, strict: bool = False
-) -> tuple[list[Tick | Skipped | Transforms], tuple[Tally, ...]]:
+) -> tuple[list[Tick | Skipped | Noted | Transforms], tuple[Tally, ...]]:
     tallies = tuple(Tally() for _ in feeds)
     return list(ticks(feeds, tallies, window, strict=strict)), tallies
 
 
-def told(items: Sequence[Tick | Skipped | Transforms]) -> list[tuple[float, dict[str, int]] | str]:
+def told(items: Sequence[Tick | Skipped | Noted | Transforms]) -> list[tuple[float, dict[str, int]] | str]:
     """Return what happened, with maps by their cells, transforms by their child frames, and times in seconds."""
     return [_told(item) for item in items]
 
 
-def _told(item: Tick | Skipped | Transforms) -> tuple[float, dict[str, int]] | str:
+def _told(item: Tick | Skipped | Noted | Transforms) -> tuple[float, dict[str, int]] | str:
     if isinstance(item, Skipped):
         return str(item.cause)
+    if isinstance(item, Noted):
+        return "noted"
     if isinstance(item, Transforms):
         since = "always" if item.stamp_ns is None else f"{(item.stamp_ns - START) / SECOND:g}"
         return f"{since}: {' '.join(each.child for each in item.links)}"
@@ -106,13 +109,6 @@ class TestOrder:
         found, _ = run(feed(*(mapped("r1", index, index, stamp_s=1.0) for index in range(9))))
         assert told(found) == [(1.0, {"r1": 8})]
 
-    def test_a_stamp_far_ahead_does_not_hold_the_others(self) -> None:
-        messages = [mapped("r1", 0.0, 1, stamp_s=1e6), mapped("r1", 1.0, 2), mapped("r1", 2.0, 3)]
-        found, _ = run(feed(*messages))
-        stamps = [item.stamp_ns for item in found if isinstance(item, Tick)]
-        assert stamps == sorted(stamps)
-        assert told(found)[-1][1] == {"r1": 1}
-
     def test_one_recording_s_order_is_no_other_s(self) -> None:
         a = feed(*(mapped("r1", 10.0 * index, index) for index in range(5)))
         b = feed(*(mapped("r2", 10.0 * index, index, stamp_s=10.0 * index - 7.0) for index in range(5)))
@@ -130,6 +126,52 @@ class TestOrder:
     def test_no_time_is_before_1970(self) -> None:
         found, _ = run(feed(mapped("r1", 1.0, 1), offset_ns=-at(3.0)))
         assert [item.stamp_ns for item in found if isinstance(item, Tick)] == [0]
+
+
+class TestStamps:
+    """What is believed of the headers' times; see also tests/property/test_stamps.py."""
+
+    @pytest.mark.parametrize("off_s", [-1e9, -7200.0, 7200.0, 1e6, 4e8])
+    @pytest.mark.parametrize("place", [0, 3, 7])
+    def test_one_that_is_far_from_those_around_it_is_taken_when_it_was_recorded(self, off_s: float, place: int) -> None:
+        stamps = [10.0 * index - 1.0 + (off_s if index == place else 0.0) for index in range(8)]
+        recorded = feed(*(mapped("r1", 10.0 * index, index, stamp) for index, stamp in enumerate(stamps)))
+        found, (tally,) = run(replace(recorded, leads_ns={"/r1/map": -SECOND}))
+        assert [item for item in told(found) if item != "noted"] == [
+            (10.0 * index - 1.0, {"r1": index}) for index in range(8)
+        ]
+        (note,) = (item for item in found if isinstance(item, Noted))
+        assert note.robot == "r1"
+        assert f"fake: /r1/map at {at(10.0 * place)} ns: the header says " in note.message
+        assert (tally.bad_stamps, tally.late, tally.messages) == (1, 0, 8)
+        # it is used all the same, so that nothing is lost
+        run(replace(recorded, leads_ns={"/r1/map": -SECOND}), strict=True)
+
+    def test_a_clock_that_jumps_and_stays_is_followed(self) -> None:
+        stamps = [10.0 * index + (1e6 if index >= 4 else 0.0) for index in range(10)]
+        found, (tally,) = run(feed(*(mapped("r1", 10.0 * index, index, stamp) for index, stamp in enumerate(stamps))))
+        ticks_of = [item for item in told(found) if item != "noted"]
+        assert [grids["r1"] for _, grids in ticks_of] == list(range(10))
+        assert [time_s for time_s, _ in ticks_of] == [
+            *(10.0 * n for n in range(6)),
+            *(1e6 + 10 * n for n in (6, 7, 8, 9)),
+        ]
+        assert tally.bad_stamps == 2
+
+    def test_the_first_of_each_topic_is_named_and_all_are_counted(self) -> None:
+        wild = [
+            mapped(robot, 10.0 * n, n, 10.0 * n + (1e6 if n % 2 else 0)) for n in range(8) for robot in ("r1", "r2")
+        ]
+        found, (tally,) = run(feed(*wild))
+        assert [item.robot for item in found if isinstance(item, Noted)] == ["r1", "r2"]
+        assert tally.bad_stamps == 8
+        assert sum(item.messages for item in found if isinstance(item, Tick)) == 16
+
+    def test_more_nanoseconds_than_a_second_are_no_time(self) -> None:
+        one, odd, three = (mapped("r1", 10.0 * index, index) for index in range(3))
+        times = (Recorded(odd.topic, odd.msgtype, odd.log_time_ns, {**odd.fields, "stamp": (5, 10**9)}),)
+        found, _ = run(feed(one, *times, three))
+        assert [item[0] for item in told(found)] == [0.0, 10.0, 20.0]
 
 
 class TestWindow:
@@ -277,7 +319,7 @@ class TestLast:
     MAPS = (mapped("r1", 0.0, 1), mapped("r1", 2.0, 2))
 
     @staticmethod
-    def are_last(found: Sequence[Tick | Skipped | Transforms]) -> list[bool]:
+    def are_last(found: Sequence[Tick | Skipped | Noted | Transforms]) -> list[bool]:
         return [item.is_last for item in found if isinstance(item, Tick)]
 
     @pytest.mark.parametrize("count", [1, 2, 5])

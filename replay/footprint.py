@@ -1,0 +1,75 @@
+"""``--max-memory``: sizes in words, and maps that would need more."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+
+from mapmerge.config import MergeConfig
+from mapmerge.footprint import CANVAS_CELL_BYTES, may_need_bytes, needed_bytes
+from mapmerge.grid import Grid
+from replay.errors import BadMessage, UsageError
+from replay.skip_cause import SkipCause
+
+_UNITS = {"": 1, "B": 1, **{f"{k}B": 1000**n for n, k in enumerate("kMGT", 1)}}
+_UNITS |= {f"{k}iB": 1024**n for n, k in enumerate("KMGT", 1)}
+_BY_NAME = {name.lower(): factor for name, factor in _UNITS.items()}
+_SIZE = re.compile(r"(\d+(?:\.\d*)?) ?([A-Za-z]*)", re.ASCII)
+_LEAST_BYTES = 1 << 20
+
+
+def size_to_bytes(text: str) -> int:
+    """Read a size such as 2GiB, 500MB or a plain number of bytes.
+
+    Raises
+    ------
+    UsageError
+        If it is none, or less than 1 MiB.
+    """
+    found = _SIZE.fullmatch(text)
+    if found is None or found[2].lower() not in _BY_NAME:
+        raise UsageError(f"{text!r} is no size; expected one such as 2GiB, 500MB, or a number of bytes")
+    size_bytes = int(Decimal(found[1]) * _BY_NAME[found[2].lower()])
+    if size_bytes < _LEAST_BYTES:
+        raise UsageError(f"{text!r} is less than 1 MiB, in which there is no map; expected one such as 2GiB")
+    return size_bytes
+
+
+def in_words(size_bytes: int) -> str:
+    """Return a size to read: 1.5 GB."""
+    for unit in ("GB", "MB", "kB"):
+        if size_bytes >= _UNITS[unit]:
+            return f"{size_bytes / _UNITS[unit]:.1f} {unit}"
+    return f"{size_bytes} bytes"
+
+
+@dataclass(frozen=True, slots=True)
+class MemoryLimit:
+    """How much memory one map may need, when it is merged with these settings."""
+
+    max_bytes: int
+    merge: MergeConfig
+
+    def refuse_over(self, grid: Grid) -> None:
+        """Refuse a map that needs more.
+
+        Raises
+        ------
+        BadMessage
+            With the cause ``over_memory``.
+        """
+        if may_need_bytes(grid, self.merge) <= self.max_bytes:
+            return
+        needed = needed_bytes(grid.cropped_to_known(), self.merge)
+        if needed > self.max_bytes:
+            raise BadMessage(
+                SkipCause.OVER_MEMORY,
+                f"a map of {grid.cols} × {grid.rows} cells of {grid.resolution_m:g} m needs about {in_words(needed)}; "
+                f"--max-memory allows {in_words(self.max_bytes)}",
+            )
+
+    @property
+    def canvas_cells(self) -> int:
+        """How many cells the merged map may have."""
+        return max(1, self.max_bytes // CANVAS_CELL_BYTES)
