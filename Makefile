@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test check format docs bench picture clean
+.PHONY: demo test check format docs bench faults picture clean
 
 demo: $(VENV)/.runtime ## set up and merge a sample recording
 	mkdir -p out
@@ -27,6 +27,9 @@ docs: $(VENV)/.dev ## write docs/cli.md anew from --help
 
 bench: $(VENV)/.dev ## measure placements against known truth
 	$(BIN)/python -m benchmarks.truth
+
+faults: $(VENV)/.dev ## try damaged recordings for a minute
+	$(BIN)/python -m benchmarks.faults --seconds 60
 
 picture: $(VENV)/.runtime ## take README's picture anew; needs a graphics card or a software renderer (mesa-vulkan-drivers)
 	mkdir -p out

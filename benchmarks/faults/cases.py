@@ -37,7 +37,7 @@ class Case:
         ValueError
             If there is none.
         """
-        kind, fault, number = (name.split("/") + ["", ""])[:3]
+        kind, fault, number = [*name.split("/"), "", ""][:3]
         if kind not in FORMATS or fault not in FAULTS or not number.isdecimal():
             raise ValueError(f"{name!r} is no case; expected one such as mcap_zstd/truncated/17")
         return Case(kind, fault, int(number), seed)

@@ -28,13 +28,13 @@ def misplaced(event: Merged, latest: Mapping[str, Grid]) -> list[str]:
     for robot, outcome in robots.items():
         if robot == reference or outcome.merged_from_map is None or robot not in latest:
             continue
-        error = _error(reference, latest[reference], robot, latest[robot], outcome.merged_from_map)
+        error = error_of(reference, latest[reference], robot, latest[robot], outcome.merged_from_map)
         if error:
             found.append(f"{robot} is placed {error}")
     return found
 
 
-def _error(reference: str, target: Grid, robot: str, source: Grid, target_from_source: Sim2) -> str:
+def error_of(reference: str, target: Grid, robot: str, source: Grid, target_from_source: Sim2) -> str:
     """Return what is wrong with a placement; "" if nothing."""
     true_target, true_source = _owner(target, reference), _owner(source, robot)
     if (true_target == STRANGER) != (true_source == STRANGER):
