@@ -261,7 +261,8 @@ def write_mcap(
         for each in messages:
             if each.topic not in channels:
                 name = each.msgtype if profile == "ros2" else each.msgtype.replace("/msg/", "/")
-                definition, _ = ros2_typestore().generate_msgdef(_known(each.msgtype), ros_version=2)
+                store, version = (ros1_typestore(), 1) if is_ros1 else (ros2_typestore(), 2)
+                definition, _ = store.generate_msgdef(_known(each.msgtype), ros_version=version)
                 schema = writer.register_schema(name, "ros1msg" if is_ros1 else "ros2msg", definition.encode())
                 channels[each.topic] = writer.register_channel(
                     each.topic, encoding or ("ros1" if is_ros1 else "cdr"), schema

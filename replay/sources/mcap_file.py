@@ -3,35 +3,46 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
 from replay.errors import InputError
+from replay.skip_cause import SkipCause
 from replay.sources.base import RawMessage, SourceInfo
 from replay.sources.boundary import TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
-from replay.sources.losses import Losses
-from replay.sources.mcap_index import NO_CHUNK, Entry, Scan, indexed_entries, read_summary, scan
+from replay.sources.losses import Loss, Losses
+from replay.sources.mcap_chunk import MOST_BYTES, BadPart, chunk_content, cut_chunk_content
+from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, indexed_entries, read_summary
 from replay.sources.mcap_records import (
+    CHUNK,
     MAGIC,
     Channel,
     RecordFile,
-    damaged_chunk,
     foreign_errors,
     message_at,
+    message_header_at,
+    written_bytes,
 )
+from replay.sources.mcap_scan import Scan, chunk_loss, indexed_counts, scan, unknown_types
 from replay.sources.topics import ENCODINGS, topic_table
-from replay.sources.zstd import decompressed_cdr
+from replay.sources.zstd import ZstdError, decompressed_cdr
 
 # What is left of the magic bytes after line endings were converted, or bytes that are no text were replaced.
 _MAGIC_IN_TEXT_MODE = (b"\x89MCAP0\n", b"\x89MCAP0\r\r\n", b"\xef\xbf\xbdMCAP0")
 
 
-class McapFile(Closing):
-    """An MCAP file, whichever of chunks, compression, indexes and summary it has.
+class _IndexLies(Exception):
+    """An index says something else than is there."""
 
-    Without a complete summary and message indexes the file is read twice: once to find the maps, once to read them.
+
+class McapFile(Closing):
+    """An MCAP file, whichever of chunks, compression, indexes and summary it has, whole or not.
+
+    A file whose summary and message indexes are complete is read by them. Any other is read twice: once to find the
+    maps, once to read them. So is one whose indexes turn out to be wrong when they are used. What is damaged is left
+    out and named.
 
     Parameters
     ----------
@@ -39,6 +50,8 @@ class McapFile(Closing):
         The file of which ``path`` is a decompressed copy, to be named in errors.
     map_scan
         What the `map_scan` of this same file was when it was open before, so that its maps are not looked for again.
+    most_bytes
+        The largest message, or decompressed chunk, that is read.
 
     Attributes
     ----------
@@ -46,17 +59,21 @@ class McapFile(Closing):
         What a pass through the file found of its maps; None as long as no pass was needed.
     """
 
-    def __init__(self, path: Path, copy_of: Path | None = None, map_scan: Scan | None = None) -> None:
+    def __init__(
+        self, path: Path, copy_of: Path | None = None, map_scan: Scan | None = None, most_bytes: int = MOST_BYTES
+    ) -> None:
         self.path = copy_of or path
         self.losses = Losses()
         with ExitStack() as stack, translated(self.path, foreign_errors()):
             file = stack.enter_context(path.open("rb"))
             if file.read(len(MAGIC)) != MAGIC:
                 raise InputError(f"{self.path}: it begins like an MCAP file {TEXT_MODE}")
-            self._file = RecordFile(self.path, file, path.stat().st_size)
+            size = path.stat().st_size
+            self._file = RecordFile(self.path, file, size, written_bytes(file, size), most_bytes)
             self._summary = read_summary(self._file)
             self.map_scan = map_scan
-            self._contents = self._summary.contents if self._summary else self._scanned().contents
+            self._index_lies = False
+            self._contents = self._known_contents()
             self._resources = stack.pop_all()
 
     @classmethod
@@ -67,69 +84,186 @@ class McapFile(Closing):
 
     @property
     def info(self) -> SourceInfo:
-        """What the file holds."""
+        """What the file holds, as far as it is known to be readable.
+
+        Chunks that an index leads to are not looked into before they are needed.
+        """
         contents = self._contents
         rows = ((each.topic, each.msgtype, contents.counts.get(key, 0)) for key, each in contents.channels.items())
         return SourceInfo("mcap", contents.start_ns, contents.stop_ns, topic_table(rows))
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
-        """Yield the messages of these topics in order of log time, ties in the order in which they were written."""
+        """Yield the messages of these topics in order of log time, ties in the order in which they were written.
+
+        Only where an index turns out to be wrong on the way, messages that it hid may come late.
+        """
         with translated(self.path, foreign_errors()):
-            wanted = {key: each for key, each in self._contents.channels.items() if each.topic in topics}
-            self._check_encodings(wanted)
-            chunks = ChunkCache(self._file.chunk)
-            entries = self._entries(wanted)
-            left = Counter(entry.block for entry in entries)
-            for entry in entries:
-                channel = wanted[entry.channel]
-                encoding = ENCODINGS[channel.encoding]
-                data = self._data(entry, chunks)
-                left[entry.block] -= 1
-                if not left[entry.block]:
-                    chunks.forget(entry.block)
-                if encoding == "cdr":
-                    data = decompressed_cdr(data)
-                yield RawMessage(channel.topic, channel.msgtype, encoding, entry.log_time_ns, data)
+            done: list[Entry] = []
+            entries = self._indexed(topics)
+            if entries is not None:
+                try:
+                    for entry, message in self._read(entries, self._wanted(topics), _Chunks(self._file, entries)):
+                        done.append(entry)
+                        yield message
+                except _IndexLies:
+                    self._distrust_index()
+                else:
+                    return
+            known = self._passed_through(topics)
+            had = {(entry.block, entry.inner) for entry in done}
+            wanted = self._wanted(topics, known.contents)
+            left = [each for each in known.entries if each.channel in wanted and (each.block, each.inner) not in had]
+            for _, message in self._read(left, wanted, _Chunks(self._file, (), known.cut_chunk)):
+                yield message
 
     def close(self) -> None:
         """Close the file."""
         self._resources.close()
 
-    def _check_encodings(self, wanted: Mapping[int, Channel]) -> None:
+    def _known_contents(self) -> Contents:
+        """Return what is known of the file, and take in what is known to be lost."""
+        contents = self._summary.contents if self._summary else None
+        if contents is None or self.map_scan is not None:
+            return self._scanned().contents
+        for loss in unknown_types(contents):
+            self.losses.add(loss)
+        return contents
+
+    def _wanted(self, topics: Collection[str], contents: Contents | None = None) -> dict[int, Channel]:
+        """Return the channels of these topics whose messages can be used."""
+        channels = (contents or self._contents).channels
+        wanted = {key: each for key, each in channels.items() if each.topic in topics and not each.problem}
         for channel in wanted.values():
             if channel.encoding not in ENCODINGS:
                 raise InputError(
                     f"{self.path}: topic {channel.topic} is encoded as '{channel.encoding}'; "
                     f"{' or '.join(ENCODINGS)} is read: convert the recording, or choose another topic"
                 )
+        return wanted
 
-    def _entries(self, wanted: Mapping[int, Channel]) -> tuple[Entry, ...]:
-        """Return where the messages of these channels are, sorted."""
-        channels = set(wanted.values())
-        only_maps = all(channel.is_map for channel in channels)
-        if self._summary and not (only_maps and self.map_scan):
-            found = indexed_entries(self._file, self._summary, wanted)
-            if found is not None:
-                return found
-        if not only_maps:
-            return scan(self._file, lambda channel: channel in channels).entries
-        known = self._scanned()
-        # By what the pass found, not by the keys of the summary, which may lack one: no message is left out in silence.
-        return tuple(entry for entry in known.entries if known.contents.channels[entry.channel] in channels)
+    def _indexed(self, topics: Collection[str]) -> tuple[Entry, ...] | None:
+        """Return where the messages of these topics are, sorted, as the indexes say; None if they do not serve."""
+        wanted = self._wanted(topics)
+        if self._summary is None or self._summary.contents is None or self._index_lies:
+            return None
+        if self.map_scan is not None and _are_maps(wanted):
+            return None
+        return indexed_entries(self._file, self._summary.chunks, self._summary.contents.counts, wanted)
+
+    def _passed_through(self, topics: Collection[str]) -> Scan:
+        """Return what a pass through the file finds of these topics."""
+        if _are_maps(self._wanted(topics)):
+            return self._scanned()
+        return self._named(scan(self._file, lambda channel: channel.topic in topics, self._summary))
 
     def _scanned(self) -> Scan:
         """Return what a pass through the file finds of its maps. It is made once, whatever is asked for first."""
         if self.map_scan is None:
-            self.map_scan = scan(self._file, lambda channel: channel.is_map)
-        return self.map_scan
+            self.map_scan = scan(self._file, lambda channel: channel.is_map, self._summary)
+        return self._named(self.map_scan)
 
-    def _data(self, entry: Entry, chunks: ChunkCache) -> bytes:
-        """Return the data of a message, once its record proves to be the one looked for."""
+    def _named(self, known: Scan) -> Scan:
+        for loss in known.losses:
+            self.losses.add(loss)
+        return known
+
+    def _distrust_index(self) -> None:
+        self._index_lies = True
+        self._contents = self._scanned().contents
+
+    def _read(
+        self, entries: Iterable[Entry], wanted: Mapping[int, Channel], chunks: _Chunks
+    ) -> Iterator[tuple[Entry, RawMessage]]:
+        """Yield the messages at these places; what turns out to be damaged is left out and named."""
+        left = Counter(entry.block for entry in entries)
+        for entry in entries:
+            left[entry.block] -= 1
+            try:
+                data = chunks.data(entry, is_last=not left[entry.block])
+            except BadPart as error:
+                lost = indexed_counts(self._file, self._file.end_of(entry.block))
+                self.losses.add(chunk_loss(entry.block, error, lost, self._contents.channels))
+                continue
+            if data is None:
+                continue
+            channel = wanted[entry.channel]
+            encoding = ENCODINGS[channel.encoding]
+            if encoding == "cdr":
+                try:
+                    data = decompressed_cdr(data, self._file.most_bytes)
+                except ZstdError as error:
+                    self.losses.add(_bad_message(entry, channel, error))
+                    continue
+            yield entry, RawMessage(channel.topic, channel.msgtype, encoding, entry.log_time_ns, data)
+
+
+class _Chunks:
+    """The messages of a file, of which a few chunks are held at a time.
+
+    Parameters
+    ----------
+    claims
+        What indexes say is in the chunks. It is checked when a chunk is loaded, before any message of it is used.
+    cut_chunk
+        The chunk at which the file was cut off.
+    """
+
+    def __init__(self, file: RecordFile, claims: Iterable[Entry], cut_chunk: int | None = None) -> None:
+        self._file = file
+        self._cut_chunk = cut_chunk
+        self._held = ChunkCache(self._loaded)
+        self._bad: set[int] = set()
+        self._claims: dict[int, list[Entry]] = {}
+        for entry in claims:
+            self._claims.setdefault(entry.block, []).append(entry)
+
+    def data(self, entry: Entry, *, is_last: bool) -> bytes | None:
+        """Return the data of a message; None if it is in a chunk that is known to be bad.
+
+        Raises
+        ------
+        BadPart
+            If its chunk is found to be bad.
+        """
         if entry.inner == NO_CHUNK:
             container, start = self._file.record_bytes(entry.block), 0
+        elif entry.block in self._bad:
+            return None
         else:
-            container, start = chunks[entry.block], entry.inner
+            try:
+                container, start = self._held[entry.block], entry.inner
+            except BadPart:
+                self._bad.add(entry.block)
+                raise
         message = message_at(container, start)
-        if message is None or message[0].channel != entry.channel or message[0].log_time_ns != entry.log_time_ns:
-            raise damaged_chunk(self.path, entry.block, "its index points to another message, or to none")
+        if is_last:
+            self._held.forget(entry.block)
+        if message is None:
+            raise ValueError("it changed while it was read")
         return message[1]
+
+    def _loaded(self, start: int) -> bytes:
+        """Return what is in a chunk."""
+        if start == self._cut_chunk:
+            return cut_chunk_content(self._file, start)
+        claims = self._claims.get(start, ())
+        record = self._file.record_at(start)
+        if claims and (record is None or record.opcode != CHUNK):
+            raise _IndexLies
+        content, _ = chunk_content(self._file, start)
+        for entry in claims:
+            header = message_header_at(content, entry.inner)
+            if header is None or header.channel != entry.channel or header.log_time_ns != entry.log_time_ns:
+                raise _IndexLies
+        return content
+
+
+def _are_maps(channels: Mapping[int, Channel]) -> bool:
+    return all(channel.is_map for channel in channels.values())
+
+
+def _bad_message(entry: Entry, channel: Channel, error: Exception) -> Loss:
+    inside = "" if entry.inner == NO_CHUNK else f"at byte {entry.inner} of the chunk "
+    place = f"the message {inside}at byte {entry.block}"
+    found = " ".join(str(error).split())
+    return Loss(SkipCause.DAMAGED, place, f"it cannot be decompressed ({found})", 1, channel.topic)

@@ -1,36 +1,46 @@
 """The records of an MCAP file: where they are, and what the few that matter say.
 
-Records are walked by their headers, so that only what is needed is read, and a file that was cut off is told from one
-that is damaged.
+Records are walked by their headers, so that only what is needed is read. No length is believed before what it says
+fits: neither that of a record nor those of the texts within it.
 """
 
 from __future__ import annotations
 
 import functools
 import struct
-import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, BinaryIO, NamedTuple, TypeVar
 
-from replay.errors import InputError
-from replay.sources.base import GRID_TYPE, UPDATE_TYPE
-from replay.sources.boundary import COMMON, translated
-from replay.sources.topics import type_in
+from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
+from replay.sources.boundary import COMMON
+from replay.sources.definitions import differing_field
+from replay.sources.topics import normalised_type, type_in
 
 if TYPE_CHECKING:
     from mcap.data_stream import ReadDataStream
 
 MAGIC = b"\x89MCAP0\r\n"
 
-FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(2, 9)
-STATISTICS = 11
+HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
+ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END = range(9, 16)
 
-_RECORD = struct.Struct("<BQ")
-_MESSAGE = struct.Struct("<HIQQ")
-_COMPRESSIONS = {"", "lz4", "zstd"}
+RECORD = struct.Struct("<BQ")
+MESSAGE_HEAD = struct.Struct("<HIQQ")
+_INDEX_HEAD = struct.Struct("<HI")
+_INDEX_ROW = struct.Struct("<QQ")
+_U16 = struct.Struct("<H")
+_U32 = struct.Struct("<I")
+
+NO_SCHEMA = "its schema is nowhere in the file"
+
+_BLOCK_BYTES = 1 << 20
+_LEAST_UNWRITTEN_BYTES = 16
+_T = TypeVar("_T")
+
+_DEFINED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
+_DEFINITION_ENCODINGS = {"ros2msg", "ros1msg", "ros2idl", "omgidl"}
 
 
 @functools.cache
@@ -71,27 +81,44 @@ class MessageHeader(NamedTuple):
 
 def message_header(container: bytes, content: int = 0) -> MessageHeader:
     """Return the header of the message whose content begins at a byte of the container."""
-    return MessageHeader(*_MESSAGE.unpack_from(container, content))
+    return MessageHeader(*MESSAGE_HEAD.unpack_from(container, content))
+
+
+def message_header_at(container: bytes, start: int) -> MessageHeader | None:
+    """Return the header of the message record at a byte of the container; None if none is."""
+    content = start + RECORD.size
+    if content > len(container):
+        return None
+    opcode, length = RECORD.unpack_from(container, start)
+    if opcode != MESSAGE or length < MESSAGE_HEAD.size or content + length > len(container):
+        return None
+    return message_header(container, content)
 
 
 def message_at(container: bytes, start: int) -> tuple[MessageHeader, bytes] | None:
     """Return the header and a copy of the data of the message record at a byte of the container; None if none is."""
-    content = start + _RECORD.size
-    if content > len(container):
+    header = message_header_at(container, start)
+    if header is None:
         return None
-    opcode, length = _RECORD.unpack_from(container, start)
-    if opcode != MESSAGE or length < _MESSAGE.size or content + length > len(container):
-        return None
-    return message_header(container, content), container[content + _MESSAGE.size : content + length]
+    _, length = RECORD.unpack_from(container, start)
+    content = start + RECORD.size
+    return header, container[content + MESSAGE_HEAD.size : content + length]
 
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """A channel with the type of its schema."""
+    """A channel with the type of its schema.
+
+    Parameters
+    ----------
+    problem
+        Why its messages cannot be used whatever they hold; "" if nothing speaks against them.
+    """
 
     topic: str
     msgtype: str
     encoding: str
+    problem: str = ""
 
     @property
     def is_map(self) -> bool:
@@ -99,76 +126,174 @@ class Channel:
         return self.msgtype in {GRID_TYPE, UPDATE_TYPE}
 
 
+class _Schema(NamedTuple):
+    name: str
+    encoding: str
+    definition: bytes
+
+
+class _Described(NamedTuple):
+    topic: str
+    encoding: str
+    schema: int
+
+
 class ChannelTable:
-    """The channels and schemas met so far."""
+    """The channels and schemas met so far.
+
+    A record may be there several times, and must then say the same each time. Of those that do not, two are kept:
+    enough to tell that none is to be believed.
+    """
 
     def __init__(self) -> None:
-        self._schemas: dict[int, str] = {0: ""}
-        self._channels: dict[int, tuple[str, str, int]] = {}
+        self._schemas: dict[int, list[_Schema]] = {0: [_Schema("", "", b"")]}
+        self._channels: dict[int, list[_Described]] = {}
 
     def add(self, opcode: int, content: bytes) -> None:
-        """Take the content of a schema or channel record; others are passed over."""
-        from mcap import records
+        """Take the content of a schema or channel record; others are passed over.
 
+        Raises
+        ------
+        ValueError
+            If its fields do not fit it.
+        """
         if opcode == SCHEMA:
-            schema = records.Schema.read(parser_stream(content))
-            self._schemas[schema.id] = schema.name
+            fields = _Fields(content)
+            key, name, encoding, definition = fields.number(), fields.text(), fields.text(), fields.block()
+            # of other types it is never looked at
+            kept = definition if normalised_type(name) in _DEFINED_TYPES else b""
+            if key:
+                _add_variant(self._schemas.setdefault(key, []), _Schema(name, encoding, kept))
         elif opcode == CHANNEL:
-            channel = records.Channel.read(parser_stream(content))
-            self._channels[channel.id] = channel.topic, channel.message_encoding, channel.schema_id
+            fields = _Fields(content)
+            key, schema, topic, encoding = fields.number(), fields.number(), fields.text(), fields.text()
+            fields.block()
+            _add_variant(self._channels.setdefault(key, []), _Described(topic, encoding, schema))
+
+    def completed_by(self, other: ChannelTable) -> ChannelTable:
+        """Return a table with what this one says and, where it says nothing, what the other one says."""
+        both = ChannelTable()
+        both._schemas = {**other._schemas, **self._schemas}
+        both._channels = {**other._channels, **self._channels}
+        return both
 
     def get(self, key: int) -> Channel | None:
-        """Return a channel; None if it, or its schema, has not been met."""
-        topic, encoding, schema = self._channels.get(key, ("", "", -1))
-        name = self._schemas.get(schema)
-        return None if name is None else Channel(topic, type_in(encoding, name), encoding)
+        """Return a channel; None if it has not been met."""
+        unknown: list[_Schema | None] = [None]
+        variants = {
+            _channel(described, schema)
+            for described in self._channels.get(key, ())
+            for schema in self._schemas.get(described.schema, unknown)
+        }
+        if len(variants) <= 1:
+            return next(iter(variants), None)
+        first = _channel(self._channels[key][0], None)
+        may_matter = any(each.is_map or each.msgtype in TF_TYPES or each.problem for each in variants)
+        problem = "the file describes it in two ways" if may_matter else ""
+        return Channel(first.topic, "unknown", first.encoding, problem)
 
     def all(self) -> dict[int, Channel]:
-        """Return all channels whose schema has been met, by id."""
+        """Return all channels that have been met, by id."""
         return {key: channel for key in sorted(self._channels) if (channel := self.get(key))}
+
+
+class _Fields:
+    """Takes the fields of a record one after the other.
+
+    Raises
+    ------
+    ValueError
+        If one does not fit into the record, or a text is none.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        self._content = content
+        self._at = 0
+
+    def number(self) -> int:
+        return int(_U16.unpack(self._take(_U16.size))[0])
+
+    def block(self) -> bytes:
+        return self._take(_U32.unpack(self._take(_U32.size))[0])
+
+    def text(self) -> str:
+        return self.block().decode()
+
+    def _take(self, length: int) -> bytes:
+        end = self._at + length
+        if end > len(self._content):
+            raise ValueError(f"a field of {length} bytes does not fit into a record of {len(self._content)}")
+        taken, self._at = self._content[self._at : end], end
+        return taken
+
+
+def _add_variant(variants: list[_T], variant: _T) -> None:
+    if variant not in variants and len(variants) < 2:
+        variants.append(variant)
+
+
+def _channel(described: _Described, schema: _Schema | None) -> Channel:
+    topic, encoding, _ = described
+    if schema is None:
+        return Channel(topic, type_in(encoding, ""), encoding, NO_SCHEMA)
+    msgtype = type_in(encoding, schema.name)
+    if msgtype in _DEFINED_TYPES and schema.encoding in _DEFINITION_ENCODINGS:
+        text = schema.definition.decode(errors="replace")
+        difference = differing_field(msgtype, text, 1 if encoding == "ros1" else 2)
+        if difference is not None:
+            return Channel(topic, f"{msgtype} (another definition)", encoding, difference)
+    return Channel(topic, msgtype, encoding)
 
 
 @dataclass(frozen=True, slots=True)
 class RecordFile:
-    """An open MCAP file."""
+    """An open MCAP file.
+
+    Parameters
+    ----------
+    written
+        Where the zeros begin with which the file ends, as space does that was reserved and never written; ``size`` if
+        there are none.
+    most_bytes
+        The largest message, or decompressed chunk, that is read.
+    """
 
     path: Path
     file: BinaryIO
     size: int
+    written: int
+    most_bytes: int
 
-    def records(self) -> Iterator[Record]:
-        """Yield the records of the file up to its footer.
+    def head_at(self, start: int, content_bytes: int = 0) -> tuple[Record, bytes] | None:
+        """Return what the bytes at ``start`` are as a record, and how its content begins.
 
-        Raises
-        ------
-        InputError
-            If the file ends before that.
+        It may reach beyond the file. None if there are not even enough bytes for a header.
         """
-        start = len(MAGIC)
-        while True:
-            record = self.record_at(start)
-            if record is None:
-                raise InputError(
-                    f"{self.path}: the file ends early at byte {self.size}: its last whole record ends at byte {start} "
-                    "and nothing closes the recording, as when recording or copying was cut off; copy it again, or "
-                    "recover a copy with `mcap recover`"
-                )
-            yield record
-            if record.opcode == FOOTER:
-                return
-            start = record.end
+        if not 0 <= start <= self.size - RECORD.size:
+            return None
+        self.file.seek(start)
+        head = self.file.read(RECORD.size + content_bytes)
+        opcode, length = RECORD.unpack_from(head)
+        content = start + RECORD.size
+        return Record(opcode, start, content, content + length), head[RECORD.size : RECORD.size + length]
+
+    def is_whole(self, record: Record) -> bool:
+        """Tell whether all of a record is there.
+
+        A record that ends among the zeros with which a file ends may have zeros in it that were never written.
+        """
+        # There is no record of type 0: such bytes were reserved for a recording and never written.
+        return record.opcode != 0 and (record.end <= self.written or record.end == self.size)
 
     def record_at(self, start: int) -> Record | None:
         """Return the record that begins at a byte of the file; None if no whole record does."""
-        self.file.seek(start)
-        head = self.file.read(_RECORD.size)
-        if len(head) < _RECORD.size:
-            return None
-        opcode, length = _RECORD.unpack(head)
-        content = start + _RECORD.size
-        # There is no record of type 0: such bytes were reserved for a recording and never written.
-        whole = opcode != 0 and content + length <= self.size
-        return Record(opcode, start, content, content + length) if whole else None
+        found = self.head_at(start)
+        return found[0] if found and self.is_whole(found[0]) else None
+
+    def end_of(self, start: int) -> int:
+        """Return where the record ends that begins at a byte of the file; that byte if none does."""
+        record = self.record_at(start)
+        return record.end if record else start
 
     def content(self, record: Record) -> bytes:
         """Return a record's content."""
@@ -176,9 +301,9 @@ class RecordFile:
         return self.file.read(record.end - record.content)
 
     def record_bytes(self, start: int) -> bytes:
-        """Return a whole record; nothing if none begins at this byte."""
+        """Return a whole record; nothing if none begins at this byte, or one that is too large."""
         record = self.record_at(start)
-        if record is None:
+        if record is None or record.end - start > self.most_bytes:
             return b""
         self.file.seek(start)
         return self.file.read(record.end - start)
@@ -186,47 +311,32 @@ class RecordFile:
     def message_header(self, record: Record) -> MessageHeader:
         """Return the header of a message that lies outside of any chunk."""
         self.file.seek(record.content)
-        return message_header(self.file.read(_MESSAGE.size))
+        return message_header(self.file.read(MESSAGE_HEAD.size))
 
-    def chunk(self, start: int) -> bytes:
-        """Return the records of the chunk at a byte of the file, decompressed and checked."""
-        from mcap.records import Chunk
-        from mcap.stream_reader import get_chunk_data_stream
-
-        with translated(self.path, foreign_errors(), part=f"the chunk at byte {start}"):
-            record = self.record_at(start)
-            if record is None or record.opcode != CHUNK:
-                raise damaged_chunk(self.path, start, "no chunk is there")
-            chunk = Chunk.read(parser_stream(self.content(record)))
-            if chunk.compression not in _COMPRESSIONS:
-                raise damaged_chunk(
-                    self.path, start, f"its compression is '{chunk.compression}', not lz4, zstd or none"
-                )
-            stream, length = get_chunk_data_stream(chunk)
-            content = stream.read(length)
-        if chunk.uncompressed_crc not in {0, zlib.crc32(content)}:
-            raise damaged_chunk(self.path, start, "its checksum (CRC) is wrong")
-        if length != chunk.uncompressed_size:
-            raise damaged_chunk(self.path, start, f"it has {length} bytes, not {chunk.uncompressed_size}")
-        return content
-
-    def inner_records(self, records: bytes, start: int) -> Iterator[Record]:
-        """Yield the records of what was read at a byte of the file: a decompressed chunk, or a summary."""
-        inner = 0
-        while inner < len(records):
-            content = inner + _RECORD.size
-            if content > len(records):
-                raise damaged_chunk(self.path, start, "its last record is cut off")
-            opcode, length = _RECORD.unpack_from(records, inner)
-            end = content + length
-            if end > len(records):
-                raise damaged_chunk(self.path, start, f"a record in it has {length} bytes, more than are left")
-            yield Record(opcode, inner, content, end)
-            inner = end
+    def message_index(self, start: int) -> tuple[int, list[tuple[int, int]], int] | None:
+        """Return channel, rows of time and place, and the end of the message index at a byte; None if none is there."""
+        record = self.record_at(start)
+        if record is None or record.opcode != MESSAGE_INDEX:
+            return None
+        content = self.content(record)
+        if len(content) < _INDEX_HEAD.size:
+            return None
+        channel, length = _INDEX_HEAD.unpack_from(content)
+        rows = content[_INDEX_HEAD.size : _INDEX_HEAD.size + length]
+        if len(rows) != length or length % _INDEX_ROW.size:
+            return None
+        return channel, list(_INDEX_ROW.iter_unpack(rows)), record.end
 
 
-def damaged_chunk(path: Path, start: int, found: str) -> InputError:
-    """Return the error for a chunk that cannot be read."""
-    return InputError(
-        f"{path}: the chunk at byte {start} is damaged: {found}; copy the recording again from where it was made"
-    )
+def written_bytes(file: BinaryIO, size: int) -> int:
+    """Return where the zeros begin with which a file ends; its size if there are only a few, which may be data."""
+    end = size
+    while end > 0:
+        start = max(0, end - _BLOCK_BYTES)
+        file.seek(start)
+        kept = len(file.read(end - start).rstrip(b"\0"))
+        if kept:
+            end = start + kept
+            break
+        end = start
+    return end if size - end >= _LEAST_UNWRITTEN_BYTES else size

@@ -1,37 +1,31 @@
-"""ROS 1 bags, version 2.0: ``.bag``."""
+"""ROS 1 bags, version 2.0: ``.bag``, and those that a recorder did not finish: ``.bag.active``."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack
-from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 from replay.errors import InputError
-from replay.sources.base import RawMessage, SourceInfo
+from replay.skip_cause import SkipCause
+from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE, RawMessage, SourceInfo
 from replay.sources.boundary import COMMON, TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
-from replay.sources.losses import Losses
+from replay.sources.definitions import differing_field
+from replay.sources.losses import Loss, Losses
+from replay.sources.rosbag1_chunks import MOST_BYTES, Chunk, read_chunk, records_in
+from replay.sources.rosbag1_index import Index, UnusableIndexError, read_index
+from replay.sources.rosbag1_records import BAG_HEADER, CONNECTION, MESSAGE, Record, record_in, record_of
+from replay.sources.rosbag1_scan import BagFile, Contents, Entry, Scan
 from replay.sources.topics import topic_table
-
-if TYPE_CHECKING:
-    from rosbags.rosbag1 import Reader
 
 _MAGIC = b"#ROSBAG V"
 _MAGIC_BEFORE_2_0 = b"#ROSRECORD V"
+_MAGIC_2_0 = b"#ROSBAG V2.0\n"
+_DECODED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 # So many CR bytes, each followed by LF by chance once in 256, come without a single CR LF in 2 of 100 files.
 _TELLING_CR_COUNT = 1000
-
-
-class _Entry(NamedTuple):
-    """Where a message is; sorts by time, then as written."""
-
-    log_time_ns: int
-    chunk: int
-    inner: int
-    connection: int
 
 
 @functools.cache
@@ -42,16 +36,26 @@ def _foreign() -> tuple[type[Exception], ...]:
 
 
 class Rosbag1File(Closing):
-    """A ROS 1 bag. rosbags reads its index; chunks are decompressed one by one, as their messages are asked for."""
+    """A ROS 1 bag. Chunks are decompressed one by one, as their messages are asked for.
 
-    def __init__(self, path: Path) -> None:
+    rosbags reads its index. If there is none, or it does not fit what it points to, a pass through the file finds the
+    messages instead.
+
+    Parameters
+    ----------
+    most_bytes
+        How many bytes a chunk may have, decompressed; larger ones are left out.
+    """
+
+    def __init__(self, path: Path, most_bytes: int = MOST_BYTES) -> None:
         self.path = path
         self.losses = Losses()
+        self._most_bytes = most_bytes
         with ExitStack() as stack, translated(path, _foreign()):
-            self._file = stack.enter_context(path.open("rb"))
-            _check_header(path, self._file)
-            self._reader = _indexed(path)
-            stack.callback(self._reader.close)
+            file = stack.enter_context(path.open("rb"))
+            self._file, header = _begin(path, BagFile(file, path.stat().st_size, len(_MAGIC_2_0), 0))
+            self._contents = self._read_contents(header)
+            self._differing = self._differing_topics()
             self._resources = stack.pop_all()
 
     @classmethod
@@ -62,81 +66,183 @@ class Rosbag1File(Closing):
 
     @property
     def info(self) -> SourceInfo:
-        """What the bag holds, from its index."""
-        reader = self._reader
-        empty = not any(reader.indexes.values())
-        return SourceInfo(
-            "rosbag1",
-            None if empty else reader.start_time,
-            None if empty else reader.end_time - 1,
-            topic_table((each.topic, each.msgtype, each.msgcount) for each in reader.connections),
+        """What the bag holds."""
+        contents, counts = self._contents, self._contents.counts()
+        start_ns, stop_ns = contents.times_ns() or (None, None)
+        rows = (
+            (each.name, self._differing.get(key, each.msgtype), counts.get(key, 0))
+            for key, each in contents.topics.items()
         )
+        return SourceInfo("rosbag1", start_ns, stop_ns, topic_table(rows))
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
-        """Yield the messages of these topics in order of log time, ties in the order in which they were written."""
+        """Yield the messages of these topics in order of log time, ties in the order in which they were written.
+
+        If the index turns out to be wrong while they are read, those that it hid follow out of order.
+        """
         with translated(self.path, _foreign()):
-            wanted = {each.id: each for each in self._reader.connections if each.topic in topics}
-            entries = sorted(
-                _Entry(each.time, each.chunk_pos, each.offset, connection)
-                for connection in wanted
-                for each in self._reader.indexes[connection]
-            )
-            chunks = ChunkCache(self._chunk)
-            for entry in entries:
-                connection = wanted[entry.connection]
-                data = self._data(chunks[entry.chunk], entry)
-                yield RawMessage(connection.topic, connection.msgtype, "ros1", entry.log_time_ns, data)
+            contents, reading = self._contents, _Reading(self, self._contents)
+            try:
+                yield from reading.messages(self._entries(contents, topics))
+            except _MisfitError as misfit:
+                self._distrust_index(contents, misfit)
+                rest = [each for each in self._entries(self._contents, topics) if not reading.has_given(each)]
+                yield from _Reading(self, self._contents).messages(rest)
 
     def close(self) -> None:
         """Close the file."""
         self._resources.close()
 
-    def _chunk(self, offset: int) -> bytes:
-        """Return a chunk's records."""
-        from rosbags.rosbag1.reader import Header, RecordType
+    def chunk(self, contents: Contents, start: int) -> Chunk:
+        """Return what can be used of a chunk; what cannot is named, unless a pass through the file did so."""
+        place = contents.chunks[start]
+        with translated(self.path, _foreign(), part=place.name):
+            chunk = read_chunk(self._file.file, place, self._most_bytes)
+        if chunk.problem is not None and isinstance(contents, Index):
+            usable = sum(each is not None and each.op == MESSAGE for each in records_in(chunk.records, place))
+            lost = max(0, contents.chunk_counts[start] - usable)
+            self.losses.add(Loss(chunk.problem.cause, place.name, chunk.problem.detail, lost))
+        return chunk
 
-        with translated(self.path, _foreign(), part=f"the chunk at byte {offset}"):
-            self._file.seek(offset)
-            size = Header.read(self._file, RecordType.CHUNK).get_uint32("size")
-            chunk = self._reader.chunks[offset]
-            self._file.seek(chunk.datapos)
-            records = chunk.decompressor(self._file.read(chunk.datasize))
-        # The only check there is of a chunk that is not compressed, or was compressed without a checksum.
-        if len(records) != size:
-            raise InputError(
-                f"{self.path}: the chunk at byte {offset} is damaged: it has {len(records)} bytes, not {size}; "
-                "copy the recording again from where it was made"
-            )
-        return records
+    def _read_contents(self, header: Record | None) -> Contents:
+        """Return what the bag holds, by its index if that can be used."""
+        file = self._file
+        if header is not None and 0 < file.index_pos <= file.size:
+            try:
+                return read_index(self.path, file, header, _foreign())
+            except UnusableIndexError as error:
+                return self._scanned(str(error), is_ended=error.is_cut)
+        if header is None:
+            return self._scanned("its header is damaged")
+        if file.index_pos:
+            reason = f"its index should begin at byte {file.index_pos}"
+        else:
+            reason = "it has no index, because its recording was not ended properly"
+        return self._scanned(reason, is_ended=True)
 
-    def _data(self, chunk: bytes, entry: _Entry) -> bytes:
-        """Return the data of the message record that the index points to."""
-        from rosbags.rosbag1.reader import Header, RecordType, read_bytes, read_uint32
+    def _scanned(self, reason: str, *, is_ended: bool = False) -> Scan:
+        """Return what a pass through the file finds, and name why it is made."""
+        scan = Scan(self._file, self.losses, self._most_bytes)
+        if is_ended or scan.is_cut:
+            detail = f"the file ends early: {reason}"
+            self.losses.add(Loss(SkipCause.ENDS_EARLY, f"byte {self._file.size}", detail, scan.lost_at_end))
+        else:
+            cause = f"{reason}; the file holds not one CR LF, {TEXT_MODE}" if self._lost_line_endings() else reason
+            self.losses.add(Loss(SkipCause.DAMAGED, "the index", f"{cause}; messages were found without it", 0))
+        return scan
 
-        with translated(self.path, _foreign(), part=f"a message in the chunk at byte {entry.chunk}"):
-            records = BytesIO(chunk)
-            records.seek(entry.inner)
-            header = Header.read(records)
-            # Some writers point to the connection record that precedes the first message of a connection.
-            while header.get_uint8("op") == RecordType.CONNECTION:
-                read_bytes(records, read_uint32(records))
-                header = Header.read(records)
-            found = (header.get_uint8("op"), header.get_uint32("conn"), header.get_time("time"))
-            expected = (RecordType.MSGDATA, entry.connection, entry.log_time_ns)
-            if found != expected:
-                raise InputError(
-                    f"{self.path}: the index does not fit the chunk at byte {entry.chunk}: found {found}, "
-                    f"expected {(int(expected[0]), *expected[1:])} as (op, conn, time); "
-                    "rebuild the index of a copy with `rosbag reindex`"
+    def _distrust_index(self, contents: Contents, misfit: _MisfitError) -> None:
+        """Replace the index, unless another reading has done so, by what a pass through the file finds."""
+        if self._contents is contents:
+            self._contents = self._scanned(str(misfit))
+
+    def _entries(self, contents: Contents, topics: Collection[str]) -> list[Entry]:
+        wanted = {key for key, each in contents.topics.items() if each.name in topics and key not in self._differing}
+        return contents.entries(wanted)
+
+    def _differing_topics(self) -> Mapping[int, str]:
+        """Return the connections whose messages are not of the standard type, with what they are listed as."""
+        found, counts = {}, self._contents.counts()
+        for key, each in self._contents.topics.items():
+            difference = differing_field(each.msgtype, each.definition, 1) if each.msgtype in _DECODED_TYPES else None
+            if difference is not None:
+                found[key] = f"{each.msgtype} (another definition)"
+                loss = Loss(SkipCause.UNKNOWN_TYPE, f"topic {each.name}", difference, counts.get(key, 0), each.name)
+                self.losses.add(loss)
+        return found
+
+    def _lost_line_endings(self) -> bool:
+        """Tell whether the file holds no CR LF although chance alone would have put some there."""
+        cr_count, last = 0, b""
+        file = self._file.file
+        file.seek(0)
+        while block := file.read(1 << 20):
+            if b"\r\n" in last + block:
+                return False
+            cr_count += block.count(b"\r")
+            last = block[-1:]
+        return cr_count >= _TELLING_CR_COUNT
+
+
+class _MisfitError(Exception):
+    """The index points to something else than a message that it describes."""
+
+
+class _Reading:
+    """One reading of a bag's messages.
+
+    Before the first message of a chunk is given, all that are wanted of it are found to be what the index says.
+    """
+
+    def __init__(self, bag: Rosbag1File, contents: Contents) -> None:
+        self._bag = bag
+        self._contents = contents
+        # what a pass found was seen to be there
+        self._is_scanned = isinstance(contents, Scan)
+        self._chunks = ChunkCache(self._load)
+        self._problems: set[int] = set()
+        self._checked: set[int] = set()
+        self._last: Entry | None = None
+
+    def messages(self, entries: list[Entry]) -> Iterator[RawMessage]:
+        """Yield the messages that these entries point to."""
+        by_chunk: dict[int, list[Entry]] = {}
+        if not self._is_scanned:
+            for entry in entries:
+                by_chunk.setdefault(entry.chunk, []).append(entry)
+        for entry in entries:
+            chunk = self._chunks[entry.chunk]
+            if by_chunk and entry.chunk not in self._checked:
+                self._check(chunk, by_chunk.pop(entry.chunk))
+            record = _message_at(chunk, entry)
+            if record is None or not (self._is_scanned or _is_followed(chunk, record)):
+                # named with the chunk
+                continue
+            topic = self._contents.topics[entry.connection]
+            self._last = entry._replace(inner=record.start)
+            yield RawMessage(topic.name, topic.msgtype, "ros1", entry.log_time_ns, chunk[record.data : record.end])
+
+    def has_given(self, entry: Entry) -> bool:
+        """Tell whether this message was yielded."""
+        return self._last is not None and entry.chunk in self._checked and entry <= self._last
+
+    def _load(self, start: int) -> bytes:
+        chunk = self._bag.chunk(self._contents, start)
+        if chunk.problem is not None:
+            self._problems.add(start)
+        return chunk.records
+
+    def _check(self, chunk: bytes, entries: list[Entry]) -> None:
+        for entry in entries:
+            record = _message_at(chunk, entry)
+            if (record is None or not _is_followed(chunk, record)) and entry.chunk not in self._problems:
+                raise _MisfitError(
+                    f"the index does not fit the chunk at byte {entry.chunk}: it has a message at byte {entry.inner} "
+                    "of it that is not there"
                 )
-            return read_bytes(records, read_uint32(records))
+        self._checked.add(entries[0].chunk)
 
 
-def _check_header(path: Path, file: BinaryIO) -> None:
-    """Refuse what rosbags refuses, with the remedy."""
-    from rosbags.rosbag1.reader import Header, RecordType
+def _message_at(chunk: bytes, entry: Entry) -> Record | None:
+    """Return the record of a message; None if it is not the one looked for."""
+    record = record_in(chunk, entry.inner)
+    # Some writers point to the connection record that precedes the first message of a connection.
+    while record is not None and record.op == CONNECTION:
+        record = record_in(chunk, record.end)
+    if record is None or record.op != MESSAGE:
+        return None
+    is_it = record.number(b"conn") == entry.connection and record.time_ns == entry.log_time_ns
+    return record if is_it and record.end <= len(chunk) else None
 
-    magic = file.readline(32)
+
+def _is_followed(chunk: bytes, record: Record) -> bool:
+    """Tell whether what follows a record proves that it ends there."""
+    return record.end == len(chunk) or record_in(chunk, record.end) is not None
+
+
+def _begin(path: Path, file: BagFile) -> tuple[BagFile, Record | None]:
+    """Return the file with its index's place, and its header if that can be read; refuse other versions."""
+    magic = file.file.readline(32)
     version = magic.decode("ascii", "replace").strip()
     if magic.startswith(_MAGIC_BEFORE_2_0):
         raise InputError(
@@ -145,48 +251,12 @@ def _check_header(path: Path, file: BinaryIO) -> None:
         )
     if magic.endswith(b"\r\n"):
         raise InputError(f"{path}: its first line ends in CR LF, {TEXT_MODE}")
-    if version != "#ROSBAG V2.0":
+    if magic != _MAGIC_2_0:
         raise InputError(f"{path}: this bag has the format '{version}'; version 2.0 is read: convert it with `rosbag`")
-    index_pos = Header.read(file, RecordType.BAGHEADER).get_uint64("index_pos")
-    size = path.stat().st_size
-    if index_pos == 0:
-        raise InputError(
-            f"{path}: the bag has no index, because its recording was not ended properly; "
-            "rebuild the index of a copy with `rosbag reindex`"
-        )
-    if index_pos > size:
-        raise InputError(
-            f"{path}: the file ends early at byte {size}: its index should begin at byte {index_pos}; "
-            "copy it again, or rebuild the index of a copy with `rosbag reindex`"
-        )
-
-
-def _indexed(path: Path) -> Reader:
-    """Return an open reader, which has read the index."""
-    from rosbags.rosbag1 import Reader
-
-    reader = Reader(path)
-    try:
-        reader.open()
-    except _foreign() as error:
-        if isinstance(error, OSError):
-            raise
-        found = " ".join(str(error).split()) or "an index record has not the size that its count calls for"
-        cause = f"it holds not one CR LF, {TEXT_MODE}; else" if _lost_line_endings(path) else "copy it again, or"
-        raise InputError(
-            f"{path}: the index of this bag is damaged ({found}): {cause} rebuild the index of a copy with "
-            "`rosbag reindex`"
-        ) from error
-    return reader
-
-
-def _lost_line_endings(path: Path) -> bool:
-    """Tell whether a file holds no CR LF although chance alone would have put some there."""
-    cr_count, last = 0, b""
-    with path.open("rb") as file:
-        while block := file.read(1 << 20):
-            if b"\r\n" in last + block:
-                return False
-            cr_count += block.count(b"\r")
-            last = block[-1:]
-    return cr_count >= _TELLING_CR_COUNT
+    header = record_of(file.file, file.start)
+    if header is None or header.op != BAG_HEADER:
+        return file, None
+    encryptor = header.fields.get(b"encryptor", b"").decode("utf-8", "replace")
+    if encryptor:
+        raise InputError(f"{path}: this bag is encrypted by '{encryptor}'; decrypt it with the ROS 1 tools first")
+    return BagFile(file.file, file.size, file.start, header.number(b"index_pos")), header

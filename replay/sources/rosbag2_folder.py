@@ -16,7 +16,7 @@ from replay.sources.base import RawMessage, Source, SourceInfo
 from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.losses import Losses
 from replay.sources.mcap_file import McapFile
-from replay.sources.mcap_index import Scan
+from replay.sources.mcap_scan import Scan
 from replay.sources.sqlite3_file import Sqlite3File
 from replay.sources.topics import topic_table
 from replay.sources.zstd import MAGIC as ZSTD_MAGIC

@@ -26,9 +26,22 @@ def decompress_file(source: Path, target: Path) -> None:
         shutil.copyfileobj(compressed, plain)
 
 
-def decompressed_cdr(data: bytes) -> bytes:
+def decompressed_cdr(data: bytes, most_bytes: int = 1 << 30) -> bytes:
     """Return a message in CDR as it was before a bag with message compression stored it.
 
     No message in CDR begins like compressed data, so that this needs no metadata.
+
+    Raises
+    ------
+    ZstdError
+        If it was cut off, is damaged, or would be larger than ``most_bytes``, whatever size it says it has.
     """
-    return zstd.decompress(data) if data.startswith(MAGIC) else data
+    if not data.startswith(MAGIC):
+        return data
+    decompressor = zstd.ZstdDecompressor()
+    plain = decompressor.decompress(data, most_bytes + 1)
+    if len(plain) > most_bytes:
+        raise ZstdError(f"it has more than {most_bytes} bytes")
+    if not decompressor.eof:
+        raise ZstdError("it ends early")
+    return plain

@@ -1,0 +1,124 @@
+"""Whether a recording's own message definitions say what the standard says.
+
+Messages are decoded by the definitions that are built in, not by those that a recording carries. Where the two differ,
+the standard one would read bytes as something that they are not, so that such messages are not to be decoded at all.
+
+Fields are compared by name, order and type, also those of the types that are used within. What has no part in the bytes
+does not matter: comments, constants, defaults, upper bounds, the order in which the types within are defined. An empty
+definition is taken as the standard one, because many writers leave it out; so is a type within that is not defined.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from typing import TYPE_CHECKING, Literal
+
+from replay.codec.typestores import ros1_typestore, ros2_typestore
+from replay.sources.base import TF_TYPE, TF_TYPES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from rosbags.interfaces.typing import FieldDesc
+
+    Fields = Mapping[str, Sequence[tuple[str, FieldDesc]]]
+
+_LARGEST_CHARS = 1 << 18
+_SEPARATOR = "=" * 80
+_SEPARATOR_LINE = re.compile(r"^={3,}[ \t]*$", re.MULTILINE)
+# lines of IDL that the parser does not know: titles, and directives such as #include
+_IDL_TITLE = re.compile(r"^IDL: .*$", re.MULTILINE)
+_IDL_BESIDE = re.compile(r"^(IDL: |[ \t]*#).*$", re.MULTILINE)
+_IDL_BODY = re.compile(r"^\s*module\s+\w+\s*\{", re.MULTILINE)
+
+
+@functools.lru_cache(maxsize=256)
+def differing_field(msgtype: str, definition: str, ros: Literal[1, 2]) -> str | None:
+    """Tell where a definition differs from the standard one.
+
+    Parameters
+    ----------
+    msgtype
+        In the form ``nav_msgs/msg/OccupancyGrid``.
+    definition
+        Text of the definition with those of the types within, as ROS 1 bags, ``ros1msg``, ``ros2msg`` and ``ros2idl``
+        have it.
+    ros
+        By which version's standard the messages would be decoded.
+
+    Returns
+    -------
+    str or None
+        The first difference, as in "width of nav_msgs/msg/MapMetaData is uint64 in the recording, uint32 in the
+        standard"; None if there is none, or if no standard definition of this type is built in.
+    """
+    store = ros1_typestore() if ros == 1 else ros2_typestore()
+    standard = {name: fields for name, (_, fields) in store.fielddefs.items()}
+    known = TF_TYPE if msgtype in TF_TYPES else msgtype
+    if known not in standard or not definition.strip("\0 \t\r\n"):
+        return None
+    recorded = _parsed(msgtype, definition)
+    if recorded is None:
+        return f"the definition of {msgtype} in the recording cannot be understood"
+    if msgtype not in recorded:
+        return f"the definition in the recording does not define {msgtype}"
+    return _first_difference(known, {**recorded, known: recorded[msgtype]}, standard)
+
+
+def _parsed(msgtype: str, definition: str) -> Fields | None:
+    """Return the fields of each type that a text defines; None if it is no definition."""
+    from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
+
+    text = definition.replace("\r\n", "\n").strip("\0")
+    if len(text) > _LARGEST_CHARS:
+        return None
+    try:
+        if _IDL_TITLE.search(text) or _IDL_BODY.search(text):
+            parts = _SEPARATOR_LINE.split(_IDL_BESIDE.sub("", text))
+            types = [get_types_from_idl(part) for part in parts if part.strip()]
+        else:
+            types = [get_types_from_msg(_SEPARATOR_LINE.sub(_SEPARATOR, text), msgtype)]
+    # a text that is no definition fails the parsers in any of these ways
+    except (TypesysError, ValueError, LookupError, AssertionError, TypeError, ArithmeticError, RecursionError):
+        return None
+    return {name: fields for part in types for name, (_, fields) in part.items()}
+
+
+def _first_difference(msgtype: str, recorded: Fields, standard: Fields) -> str | None:
+    """Return the first difference of a type or, depth first, of one within it."""
+    expected = standard[msgtype]
+    for (name, field), (own_name, own_field) in zip(expected, recorded[msgtype], strict=False):
+        if name != own_name:
+            return f"a field of {msgtype} is {own_name} in the recording, {name} in the standard"
+        kind, own_kind = _type_name(field), _type_name(own_field)
+        if kind != own_kind:
+            return f"{name} of {msgtype} is {own_kind} in the recording, {kind} in the standard"
+        inner = kind.partition("[")[0]
+        if inner in standard and inner in recorded:
+            difference = _first_difference(inner, recorded, standard)
+            if difference is not None:
+                return difference
+    return _missing_or_extra(msgtype, recorded[msgtype], expected)
+
+
+def _missing_or_extra(
+    msgtype: str, recorded: Sequence[tuple[str, FieldDesc]], expected: Sequence[tuple[str, FieldDesc]]
+) -> str | None:
+    if len(recorded) > len(expected):
+        return f"{msgtype} has the field {recorded[len(expected)][0]} in the recording, and not in the standard"
+    if len(recorded) < len(expected):
+        return f"{msgtype} has no field {expected[len(recorded)][0]} in the recording, but in the standard"
+    return None
+
+
+def _type_name(field: FieldDesc) -> str:
+    """Return a field's type as in a definition, without its bounds, which are not in the bytes."""
+    from rosbags.interfaces import Nodetype
+
+    if field[0] == Nodetype.BASE:
+        return field[1][0]
+    if field[0] == Nodetype.NAME:
+        return field[1]
+    inner, size = field[1]
+    return f"{_type_name(inner)}[{size if field[0] == Nodetype.ARRAY else ''}]"

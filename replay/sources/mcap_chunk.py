@@ -1,0 +1,202 @@
+"""What is in a chunk of an MCAP file, decompressed and checked.
+
+A chunk is used as a whole or not at all, because its checksum says only that something in it is wrong. The one at which
+a file was cut off has none that could be checked: of it, all whole records are used that can be decompressed.
+
+No size is believed: what is decompressed is counted, and given up on once it is more than the largest chunk that is
+read.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from replay.skip_cause import SkipCause
+from replay.sources.mcap_records import CHUNK, MESSAGE, MESSAGE_HEAD, RECORD, Record, RecordFile
+
+MOST_BYTES = 1 << 30
+"""The largest chunk that is read, as decompressed, unless something else is said."""
+
+_HEAD = struct.Struct("<QQQII")
+_LENGTH = struct.Struct("<Q")
+_COMPRESSIONS = {b"", b"lz4", b"zstd"}
+# larger steps take longer: their memory is asked of the system anew each time
+_STEP_BYTES = 1 << 18
+
+
+class BadPart(Exception):
+    """A part of a file cannot be used."""
+
+    def __init__(self, cause: SkipCause, detail: str) -> None:
+        super().__init__(detail)
+        self.cause = cause
+        self.detail = detail
+
+
+class ChunkHead(NamedTuple):
+    """What a chunk says of itself, and how many bytes that takes."""
+
+    size: int
+    crc: int
+    compression: bytes
+    data_bytes: int
+    head_bytes: int
+
+
+CHUNK_HEAD_BYTES = _HEAD.size + 4 + _LENGTH.size
+
+
+def chunk_head(content: bytes) -> ChunkHead | None:
+    """Return what the content of a chunk record begins with; None if that is no chunk that can be read."""
+    if len(content) < _HEAD.size:
+        return None
+    _, _, size, crc, length = _HEAD.unpack_from(content)
+    end = _HEAD.size + length
+    if end + _LENGTH.size > len(content):
+        return None
+    (data_bytes,) = _LENGTH.unpack_from(content, end)
+    return ChunkHead(size, crc, content[_HEAD.size : end], data_bytes, end + _LENGTH.size)
+
+
+def is_consistent(record: Record, content: bytes) -> bool:
+    """Tell whether a chunk's lengths agree with each other, and its compression is one that is read."""
+    head = chunk_head(content)
+    return (
+        head is not None
+        and head.compression in _COMPRESSIONS
+        and head.head_bytes + head.data_bytes == record.end - record.content
+    )
+
+
+def chunk_content(file: RecordFile, start: int) -> tuple[bytes, bool]:
+    """Return the records of the chunk at a byte of the file, and whether a checksum says that they are right.
+
+    Raises
+    ------
+    BadPart
+        If it cannot be used.
+    """
+    record = file.record_at(start)
+    if record is None or record.opcode != CHUNK:
+        raise BadPart(SkipCause.DAMAGED, "no chunk is there")
+    if record.end - record.start > file.most_bytes:
+        raise _too_large(file)
+    content = file.content(record)
+    head = chunk_head(content)
+    if head is not None and head.compression not in _COMPRESSIONS:
+        name = head.compression.decode(errors="replace")
+        raise BadPart(SkipCause.DAMAGED, f"its compression is '{name}', not lz4, zstd or none")
+    if head is None or head.head_bytes + head.data_bytes != len(content):
+        raise BadPart(SkipCause.DAMAGED, f"the lengths in it do not fit its {len(content)} bytes")
+    plain = _decompressed(head.compression, content[head.head_bytes :], file)
+    if len(plain) > file.most_bytes:
+        raise _too_large(file)
+    if head.crc not in {0, zlib.crc32(plain)}:
+        raise BadPart(SkipCause.WRONG_CHECKSUM, "its checksum (CRC) is wrong")
+    if len(plain) != head.size:
+        raise BadPart(SkipCause.DAMAGED, f"it has {len(plain)} bytes, not {head.size}")
+    return plain, head.crc != 0
+
+
+def cut_chunk_content(file: RecordFile, start: int) -> bytes:
+    """Return the whole records of a chunk at which the file was cut off, as far as they can be decompressed.
+
+    Raises
+    ------
+    BadPart
+        If what is there is damaged.
+    """
+    found = file.head_at(start, CHUNK_HEAD_BYTES + 4)
+    head = chunk_head(found[1]) if found else None
+    if found is None or head is None:
+        return b""
+    file.file.seek(found[0].content + head.head_bytes)
+    # without the zeros at the end of the file, which a decompressor would take for data
+    data = file.file.read(min(file.written - file.file.tell(), file.most_bytes))
+    plain = _decompressed(head.compression, data, file)
+    end = 0
+    for record in _records(plain):
+        if record.end > len(plain):
+            break
+        end = record.end
+    return plain[:end]
+
+
+def inner_records(content: bytes) -> Iterator[Record]:
+    """Yield the records in a decompressed chunk.
+
+    Raises
+    ------
+    BadPart
+        If they do not fit it.
+    """
+    for record in _records(content):
+        length = record.end - record.content
+        if record.end > len(content):
+            raise BadPart(SkipCause.DAMAGED, f"a record in it has {length} bytes, more than are left")
+        if record.opcode == 0 or (record.opcode == MESSAGE and length < MESSAGE_HEAD.size):
+            raise BadPart(SkipCause.DAMAGED, f"what should be a record in it, of type {record.opcode}, is none")
+        yield record
+
+
+def _records(content: bytes) -> Iterator[Record]:
+    """Yield records by their lengths; the last one may reach beyond what is there."""
+    start = 0
+    while start < len(content):
+        inner = start + RECORD.size
+        if inner > len(content):
+            yield Record(0, start, inner, inner)
+            return
+        opcode, length = RECORD.unpack_from(content, start)
+        yield Record(opcode, start, inner, inner + length)
+        start = inner + length
+
+
+def _too_large(file: RecordFile) -> BadPart:
+    return BadPart(SkipCause.OVER_MEMORY, f"it has more than {file.most_bytes} bytes")
+
+
+def _decompressed(compression: bytes, data: bytes, file: RecordFile) -> bytes:
+    """Return what is in the data, up to a little more than the largest chunk that is read."""
+    from zstandard import ZstdError
+
+    if not compression:
+        return data
+    steps = _zstd_steps(data) if compression == b"zstd" else _lz4_steps(data)
+    plain: list[bytes] = []
+    left = file.most_bytes
+    try:
+        for step in steps:
+            plain.append(step)
+            left -= len(step)
+            if left < 0:
+                break
+    # RuntimeError is lz4's
+    except (ZstdError, RuntimeError) as error:
+        found = " ".join(str(error).split())
+        raise BadPart(SkipCause.DAMAGED, f"it cannot be decompressed ({found})") from error
+    return b"".join(plain)
+
+
+def _zstd_steps(data: bytes) -> Iterator[bytes]:
+    from zstandard import ZstdDecompressor
+
+    with ZstdDecompressor().stream_reader(data, read_across_frames=True) as reader:
+        while step := reader.read(_STEP_BYTES):
+            yield step
+
+
+def _lz4_steps(data: bytes) -> Iterator[bytes]:
+    from lz4.frame import LZ4FrameDecompressor
+
+    while data:
+        decompressor = LZ4FrameDecompressor()
+        step, data = decompressor.decompress(data, _STEP_BYTES), b""
+        while step or not (decompressor.eof or decompressor.needs_input):
+            yield step
+            step = b"" if decompressor.eof else decompressor.decompress(b"", _STEP_BYTES)
+        if decompressor.eof:
+            data = decompressor.unused_data or b""

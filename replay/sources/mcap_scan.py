@@ -1,0 +1,305 @@
+"""One pass through an MCAP file, one chunk in memory at a time: what is there, and what cannot be used.
+
+A chunk that cannot be used costs the messages in it, a damaged record those up to the next sound one, and the end of a
+file that was cut off what would have come after it. Each is named. Where a sound summary counts just as many messages
+as were found, nothing is lost, whatever else is damaged.
+
+Messages outside of chunks, and those in chunks without a checksum, are covered by the checksum of the data section
+alone, if it has one. Where that is wrong, nothing tells which of them are right: none of them is used.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from replay.skip_cause import SkipCause
+from replay.sources.losses import Loss
+from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content, inner_records
+from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, Summary, file_crc
+from replay.sources.mcap_records import (
+    CHANNEL,
+    CHUNK,
+    HEADER,
+    MAGIC,
+    MESSAGE,
+    SCHEMA,
+    Channel,
+    ChannelTable,
+    MessageHeader,
+    Record,
+    RecordFile,
+    message_header,
+)
+from replay.sources.mcap_walk import Gap, Walk
+from replay.words import counted
+
+_CRC = struct.Struct("<I")
+_MOST_NAMED = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """What one pass through a file found.
+
+    Parameters
+    ----------
+    entries
+        Where the messages of the channels asked for are, sorted.
+    cut_chunk
+        Where the chunk begins at which the file was cut off, if it was.
+    losses
+        What cannot be used.
+    """
+
+    contents: Contents
+    entries: tuple[Entry, ...]
+    cut_chunk: int | None = None
+    losses: tuple[Loss, ...] = ()
+
+
+def scan(file: RecordFile, wanted: Callable[[Channel], bool], summary: Summary | None = None) -> Scan:
+    """Pass through a file once.
+
+    Parameters
+    ----------
+    wanted
+        Tells of which channels the messages are to be found.
+    summary
+        What it says is taken where nothing else does or, if it is checked, in place of what else does.
+    """
+    walk = Walk(file, summary.places if summary else ())
+    found = _Found(file, wanted, summary)
+    for record in walk:
+        if record.opcode == CHUNK and walk.data_end is None:
+            found.add_chunk(record)
+        elif record.opcode == MESSAGE and walk.data_end is None:
+            found.add_loose(record)
+        elif record.opcode in {SCHEMA, CHANNEL}:
+            found.describe(record)
+    return found.scan(walk)
+
+
+@dataclass(slots=True)
+class _Messages:
+    """Messages of a pass."""
+
+    entries: list[Entry] = field(default_factory=list)
+    counts: Counter[int] = field(default_factory=Counter)
+    times_ns: tuple[int, int] | None = None
+
+    def add(self, message: MessageHeader) -> None:
+        first_ns, last_ns = self.times_ns or (message.log_time_ns, message.log_time_ns)
+        self.times_ns = min(first_ns, message.log_time_ns), max(last_ns, message.log_time_ns)
+        self.counts[message.channel] += 1
+
+
+class _Found:
+    """What a pass through a file has found so far."""
+
+    def __init__(self, file: RecordFile, wanted: Callable[[Channel], bool], summary: Summary | None) -> None:
+        self._file = file
+        self._wanted = wanted
+        self._summary = summary
+        self._table = ChannelTable()
+        self._is_wanted: dict[int, bool] = {}
+        # those that a checksum of their own covers, and the others
+        self._covered, self._others = _Messages(), _Messages()
+        self._bad_chunks: list[tuple[int, BadPart, Counter[int] | None]] = []
+        self._losses: list[Loss] = []
+
+    def describe(self, record: Record) -> None:
+        """Take in a schema or channel outside of chunks."""
+        try:
+            self._table.add(record.opcode, self._file.content(record))
+        except ValueError as error:
+            self._losses.append(_damaged(record.start, record.end, f"it does not describe a channel: {error}"))
+
+    def add_chunk(self, record: Record) -> None:
+        """Take in a chunk, all of it or nothing."""
+        try:
+            content, is_covered = chunk_content(self._file, record.start)
+            self._add_content(content, record.start, self._covered if is_covered else self._others)
+        except BadPart as error:
+            self._bad_chunks.append((record.start, error, indexed_counts(self._file, record.end)))
+
+    def add_loose(self, record: Record) -> None:
+        """Take in a message outside of chunks."""
+        length = record.end - record.start
+        if length > self._file.most_bytes:
+            detail = f"it has {length} bytes; at most {self._file.most_bytes} are read"
+            self._losses.append(Loss(SkipCause.OVER_MEMORY, f"the message at byte {record.start}", detail, 1))
+            return
+        self._add(self._file.message_header(record), record.start, NO_CHUNK, self._others)
+
+    def _add_content(self, content: bytes, start: int, messages: _Messages) -> None:
+        records = list(inner_records(content))
+        try:
+            for record in records:
+                if record.opcode in {SCHEMA, CHANNEL}:
+                    self._table.add(record.opcode, content[record.content : record.end])
+        except ValueError as error:
+            raise BadPart(SkipCause.DAMAGED, f"a record in it does not describe a channel: {error}") from error
+        for record in records:
+            if record.opcode == MESSAGE:
+                self._add(message_header(content, record.content), start, record.start, messages)
+
+    def _add(self, message: MessageHeader, block: int, inner: int, messages: _Messages) -> None:
+        messages.add(message)
+        key = message.channel
+        if key not in self._is_wanted:
+            channel = self._known().get(key)
+            # what is not described yet may be later
+            self._is_wanted[key] = channel is None or bool(channel.problem) or self._wanted(channel)
+        if self._is_wanted[key]:
+            messages.entries.append(Entry(message.log_time_ns, block, inner, key))
+
+    def _known(self) -> ChannelTable:
+        """Return the channels met so far, with those of the summary."""
+        if self._summary is None:
+            return self._table
+        if self._summary.is_checked:
+            return self._summary.table.completed_by(self._table)
+        return self._table.completed_by(self._summary.table)
+
+    def scan(self, walk: Walk) -> Scan:
+        """Return what was found, once all was passed through."""
+        if walk.cut_chunk is not None:
+            self._add_cut_chunk(walk.cut_chunk)
+        self._check_data(walk)
+        channels = self._known().all()
+        counts = self._covered.counts + self._others.counts
+        contents = Contents(channels, counts, *self._times_ns())
+        entries = sorted(
+            entry
+            for entry in (*self._covered.entries, *self._others.entries)
+            if entry.channel in channels and self._wanted(channels[entry.channel])
+        )
+        return Scan(contents, tuple(entries), walk.cut_chunk, tuple(self._all_losses(walk, contents)))
+
+    def _add_cut_chunk(self, start: int) -> None:
+        try:
+            self._add_content(cut_chunk_content(self._file, start), start, self._others)
+        except BadPart as error:
+            self._bad_chunks.append((start, error, None))
+
+    def _check_data(self, walk: Walk) -> None:
+        """Let go of what only the checksum of the data section covers, if it is wrong."""
+        if walk.data_end is None or not self._others.counts:
+            return
+        content = self._file.content(walk.data_end)
+        if _CRC.unpack(content)[0] in {0, file_crc(self._file, 0, walk.data_end.start)}:
+            return
+        detail = (
+            "its checksum (CRC) is wrong, and the messages that no other one covers are left out, because nothing "
+            "tells which of them are right; copy the recording again from where it was made"
+        )
+        lost = self._others.counts.total()
+        self._losses.append(Loss(SkipCause.WRONG_CHECKSUM, "the data section", detail, lost))
+        self._others = _Messages()
+
+    def _times_ns(self) -> tuple[int | None, int | None]:
+        times = [times for each in (self._covered, self._others) if (times := each.times_ns)]
+        return min((first for first, _ in times), default=None), max((last for _, last in times), default=None)
+
+    def _all_losses(self, walk: Walk, contents: Contents) -> list[Loss]:
+        unknown = list(unknown_types(contents))
+        counted_all = self._summary.statistics if self._summary and self._summary.is_checked else None
+        found = {key: count for key, count in contents.counts.items() if count}
+        if counted_all is not None and found == {
+            key: count for key, count in counted_all.channel_message_counts.items() if count
+        }:
+            return unknown
+        losses = [*self._losses]
+        losses += [chunk_loss(start, error, lost, contents.channels) for start, error, lost in self._bad_chunks]
+        losses += [self._gap_loss(gap) for gap in walk.gaps]
+        if walk.ends_early is not None:
+            losses.append(_ends_early(walk.ends_early, self._file))
+        if not losses and counted_all is not None:
+            losses += _missing(counted_all.channel_message_counts, contents)
+        return [*losses, *self._after_the_end(walk), *unknown]
+
+    def _gap_loss(self, gap: Gap) -> Loss:
+        lost = indexed_counts(self._file, gap.stop)
+        what = f"what should be a record there, of type {gap.opcode}, is none that can be read"
+        return _damaged(gap.start, gap.stop, what, lost.total() if lost else None)
+
+    def _after_the_end(self, walk: Walk) -> list[Loss]:
+        """Return what is lost if files were put together end to end."""
+        if walk.footer is None:
+            return []
+        end = walk.footer.end + len(MAGIC)
+        self._file.file.seek(end)
+        if self._file.file.read(len(MAGIC) + 1) != MAGIC + bytes([HEADER]):
+            return []
+        return [_damaged(end, self._file.size, "another recording begins there, after the end of this one: split them")]
+
+
+def _damaged(start: int, stop: int, detail: str, messages: int | None = None) -> Loss:
+    return Loss(SkipCause.DAMAGED, f"bytes {start} to {stop}", detail, messages)
+
+
+def _ends_early(end: int, file: RecordFile) -> Loss:
+    detail = (
+        f"the last whole record ends there, {counted(file.size - end, 'byte')} before the end of the file, and nothing "
+        "closes the recording, as when recording or copying was cut off; copy it again if there is a whole one"
+    )
+    return Loss(SkipCause.ENDS_EARLY, f"byte {end}", detail)
+
+
+def indexed_counts(file: RecordFile, start: int) -> Counter[int] | None:
+    """Return how many messages of each channel a chunk has, as the indexes say that follow it; None if none do."""
+    counts: Counter[int] = Counter()
+    while (index := file.message_index(start)) is not None:
+        channel, rows, start = index
+        counts[channel] += len(rows)
+    return counts or None
+
+
+def chunk_loss(start: int, error: BadPart, lost: Counter[int] | None, channels: Mapping[int, Channel]) -> Loss:
+    """Return what is lost with a chunk."""
+    place = f"the chunk at byte {start}"
+    if not lost:
+        return Loss(error.cause, place, error.detail)
+    topics: Counter[str] = Counter()
+    for key, count in lost.items():
+        topics[channels[key].topic if key in channels else f"channel {key}"] += count
+    named = ", ".join(f"{count} of {topic}" for topic, count in topics.most_common(_MOST_NAMED))
+    more = " and others" if len(topics) > _MOST_NAMED else ""
+    return Loss(
+        error.cause,
+        place,
+        f"{error.detail}; in it are {named}{more}",
+        lost.total(),
+        next(iter(topics)) if len(topics) == 1 else "",
+    )
+
+
+def unknown_types(contents: Contents) -> list[Loss]:
+    """Return which messages are there and cannot be used, because of what is known of their channels."""
+    losses = []
+    for key, count in sorted(contents.counts.items()):
+        channel = contents.channels.get(key)
+        if not count:
+            continue
+        if channel is None:
+            losses.append(
+                Loss(SkipCause.UNKNOWN_TYPE, f"channel {key}", "no record of the file describes this channel", count)
+            )
+        elif channel.problem:
+            losses.append(Loss(SkipCause.UNKNOWN_TYPE, f"topic {channel.topic}", channel.problem, count, channel.topic))
+    return losses
+
+
+def _missing(counts: Mapping[int, int], contents: Contents) -> list[Loss]:
+    """Return of which channels there are fewer messages than a sound summary counts."""
+    losses = []
+    for key, count in sorted(counts.items()):
+        short = count - contents.counts.get(key, 0)
+        topic = contents.channels[key].topic if key in contents.channels else ""
+        if short > 0:
+            detail = f"the summary counts {counted(count, 'message')}, and {count - short} are there"
+            losses.append(Loss(SkipCause.DAMAGED, "the data section", detail, short, topic))
+    return losses

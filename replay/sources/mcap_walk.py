@@ -1,0 +1,288 @@
+"""The records of an MCAP file one after the other, past what is damaged.
+
+A record whose header is damaged hides where the next one begins. Then the next place is looked for from which records
+follow each other as they should: types that there are, lengths that fit the file, and fields that fit the record; of
+messages, which have little that could be told by, times near the ones before. Where a sound summary says at which bytes
+chunks begin, only these are tried. In a recording with chunks a message is never taken for such a place, because it may
+be one within a chunk, whose checksum says nothing of one message.
+
+The file is read once from its begin to its end; each place is looked at in constant time.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from struct import Struct
+
+from replay.sources.mcap_chunk import CHUNK_HEAD_BYTES, is_consistent
+from replay.sources.mcap_records import (
+    ATTACHMENT,
+    ATTACHMENT_INDEX,
+    CHANNEL,
+    CHUNK,
+    CHUNK_INDEX,
+    DATA_END,
+    FOOTER,
+    HEADER,
+    MAGIC,
+    MESSAGE,
+    MESSAGE_HEAD,
+    MESSAGE_INDEX,
+    METADATA,
+    METADATA_INDEX,
+    RECORD,
+    SCHEMA,
+    STATISTICS,
+    SUMMARY_OFFSET,
+    Record,
+    RecordFile,
+    message_header,
+)
+
+_PRIVATE = 0x80
+_HEAD_BYTES = CHUNK_HEAD_BYTES + 4
+_BLOCK_BYTES = 1 << 20
+_NEAR_NS = 86_400 * 10**9
+_MOST_UNKNOWN = 16
+
+_U32 = Struct("<I")
+# At most 4 GiB long, so that half of the length is zeros.
+_ANY_RECORD = re.compile(rb"[\x01-\x0f](?=[\s\S]{4}\0{4})")
+_NO_MESSAGE = re.compile(rb"[\x02\x06\x07\x09\x0c\x0f](?=[\s\S]{4}\0{4})")
+
+# How long the content of a record is at least, and where in it the length of its first text is, if it has one.
+_SHAPES: dict[int, tuple[int, int | None]] = {
+    HEADER: (8, 0),
+    SCHEMA: (14, 2),
+    CHANNEL: (16, 4),
+    MESSAGE: (MESSAGE_HEAD.size, None),
+    CHUNK_INDEX: (64, None),
+    ATTACHMENT: (36, 16),
+    ATTACHMENT_INDEX: (48, None),
+    STATISTICS: (46, None),
+    METADATA: (8, 0),
+    METADATA_INDEX: (20, 16),
+    SUMMARY_OFFSET: (17, None),
+}
+_KNOWN = {*_SHAPES, FOOTER, CHUNK, MESSAGE_INDEX, DATA_END}
+# What they say of themselves leaves no doubt.
+_SURE = {CHUNK, MESSAGE_INDEX, DATA_END, FOOTER}
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Bytes of the file that are no records; ``opcode`` is what the first of them would be as one."""
+
+    start: int
+    stop: int
+    opcode: int
+
+
+class Walk:
+    """Yields the records of the data section; of the summary section, no more than there is.
+
+    Parameters
+    ----------
+    chunk_starts
+        Where chunks begin, and where the data section ends, as a sound summary says; ascending.
+
+    Attributes
+    ----------
+    gaps
+        What was passed over as damaged, or as of a type that there is not.
+    ends_early
+        Where the last whole record ends, if nothing closes the recording.
+    cut_chunk
+        Where the chunk begins at which it was cut off, if it was.
+    data_end
+        The record that closes the data section, if it was met.
+    footer
+        The record that closes the file, if it was met.
+    """
+
+    def __init__(self, file: RecordFile, chunk_starts: Sequence[int] = ()) -> None:
+        self.gaps: list[Gap] = []
+        self.ends_early: int | None = None
+        self.cut_chunk: int | None = None
+        self.data_end: Record | None = None
+        self.footer: Record | None = None
+        self._file = file
+        self._chunk_starts = chunk_starts
+        self._has_chunks = bool(chunk_starts)
+        self._time_ns: int | None = None
+        self._resumed: tuple[int, int | None] = (-1, None)
+
+    def __iter__(self) -> Iterator[Record]:
+        start = self._after_magic(len(MAGIC))
+        while True:
+            record = self._next(start)
+            if record is None:
+                resumed = self._resume(start)
+                if resumed is None:
+                    self._end_early(start)
+                    return
+                self._pass_over(start, resumed)
+                start = resumed
+                continue
+            if record.opcode not in _KNOWN and record.opcode < _PRIVATE and self.data_end is None:
+                self.gaps.append(Gap(record.start, record.end, record.opcode))
+            yield record
+            start = record.end
+            if record.opcode == DATA_END:
+                self.data_end = record
+            if record.opcode == FOOTER:
+                self.footer = record
+                return
+
+    def _after_magic(self, start: int) -> int:
+        """Return where records begin; the magic bytes may be there several times."""
+        self._file.file.seek(start)
+        while self._file.file.read(len(MAGIC)) == MAGIC:
+            start += len(MAGIC)
+        return start
+
+    def _next(self, start: int) -> Record | None:
+        """Return the record at a byte; None if there is none that can be taken for one."""
+        found = self._file.head_at(start, _HEAD_BYTES)
+        if found is None or not self._file.is_whole(found[0]):
+            return None
+        record, head = found
+        if record.opcode not in _KNOWN:
+            return record if self._follows(record.end, after_unknown=True) else None
+        if not self._is_plausible(record, head):
+            # a chunk that nothing but itself speaks against is left to who reads it
+            return record if record.opcode == CHUNK and self._follows(record.end) else None
+        self._has_chunks |= record.opcode in {CHUNK, MESSAGE_INDEX}
+        if record.opcode not in _SURE and not self._follows(record.end):
+            after = self._resume(record.end)
+            if after is not None and not self._begins_damaged(record, after):
+                return None
+        if record.opcode == MESSAGE:
+            self._time_ns = message_header(head).log_time_ns
+        return record
+
+    def _follows(self, start: int, *, after_unknown: bool = False) -> bool:
+        """Tell whether a record begins where another one ends, or the file is at its end there."""
+        for _ in range(_MOST_UNKNOWN):
+            if start in {self._file.size, self._file.written}:
+                return True
+            found = self._file.head_at(start, _HEAD_BYTES)
+            if found is None or not self._file.is_whole(found[0]):
+                return False
+            if found[0].opcode in _KNOWN:
+                is_plausible = self._is_plausible(*found)
+                # These follow chunks only: what seems to be of an unknown type is a chunk with a damaged header.
+                is_chunk = is_plausible and after_unknown and found[0].opcode == MESSAGE_INDEX
+                self._has_chunks |= is_chunk
+                return is_plausible and not is_chunk
+            start = found[0].end
+        return False
+
+    def _begins_damaged(self, record: Record, after: int) -> bool:
+        """Tell whether it is the record that follows this one of which the header is damaged, and not this one's.
+
+        Parameters
+        ----------
+        after
+            Where sound records begin again.
+        """
+        found = self._file.head_at(record.end, MESSAGE_HEAD.size)
+        if found is None:
+            return False
+        following, head = found
+        if following.end == after:
+            return True
+        if record.opcode != MESSAGE or following.opcode != MESSAGE or len(head) < MESSAGE_HEAD.size:
+            return False
+        own = self._file.message_header(record)
+        return abs(message_header(head).log_time_ns - own.log_time_ns) < _NEAR_NS
+
+    def _is_plausible(self, record: Record, head: bytes) -> bool:
+        """Tell whether the fields of a record fit its length."""
+        length = record.end - record.content
+        if record.opcode == CHUNK:
+            return is_consistent(record, head)
+        if record.opcode == MESSAGE_INDEX:
+            return length % 16 == 6 and _number(head, 2) == length - 6
+        if record.opcode == DATA_END:
+            return length == 4
+        if record.opcode == FOOTER:
+            self._file.file.seek(record.end)
+            return length == 20 and self._file.file.read(len(MAGIC)) == MAGIC
+        least, text_at = _SHAPES[record.opcode]
+        return length >= least and (text_at is None or _number(head, text_at) <= length - least)
+
+    def _end_early(self, start: int) -> None:
+        """Note where the file ends; after the data section nothing is missing that cannot do without."""
+        if self.data_end is not None:
+            return
+        self.ends_early = start
+        found = self._file.head_at(start, _HEAD_BYTES)
+        if found and found[0].opcode == CHUNK and is_consistent(*found):
+            self.cut_chunk = start
+
+    def _pass_over(self, start: int, stop: int) -> None:
+        if self.data_end is None:
+            found = self._file.head_at(start)
+            self.gaps.append(Gap(start, stop, found[0].opcode if found else 0))
+
+    def _resume(self, start: int) -> int | None:
+        """Return the next place after this one at which records follow each other; None if there is none."""
+        if self._resumed[0] != start:
+            self._resumed = start, self._sought(start)
+        return self._resumed[1]
+
+    def _sought(self, start: int) -> int | None:
+        found = self._file.head_at(start, _HEAD_BYTES)
+        if found and found[0].opcode == CHUNK:
+            if is_consistent(*found):
+                # the file was cut off here
+                return None
+            self._has_chunks |= self._time_ns is None
+        known = bisect_right(self._chunk_starts, start)
+        for place in self._chunk_starts[known:]:
+            if self._is_chain(place):
+                return place
+        return next((place for place in self._candidates(start + 1) if self._is_chain(place)), None)
+
+    def _candidates(self, start: int) -> Iterator[int]:
+        """Yield where something begins like a record."""
+        pattern = _NO_MESSAGE if self._has_chunks else _ANY_RECORD
+        overlap = RECORD.size - 1
+        while start < self._file.written:
+            self._file.file.seek(start)
+            block = self._file.file.read(_BLOCK_BYTES + overlap)
+            for match in pattern.finditer(block, 0, len(block)):
+                if match.start() < _BLOCK_BYTES:
+                    yield start + match.start()
+            start += _BLOCK_BYTES
+
+    def _is_chain(self, start: int) -> bool:
+        """Tell whether so many records follow each other from here that it is no chance."""
+        needed = 3
+        for number in range(3):
+            found = self._file.head_at(start, _HEAD_BYTES)
+            if found is None or found[0].opcode not in _KNOWN or not self._is_plausible(*found):
+                return False
+            record, head = found
+            if not self._file.is_whole(record):
+                return record.opcode == CHUNK
+            if record.opcode in {CHUNK, DATA_END, FOOTER} or record.end == self._file.size:
+                return True
+            if record.opcode == MESSAGE and self._is_near(head):
+                needed = 2
+            if number + 1 >= needed:
+                return True
+            start = record.end
+        return True
+
+    def _is_near(self, head: bytes) -> bool:
+        return self._time_ns is not None and abs(message_header(head).log_time_ns - self._time_ns) < _NEAR_NS
+
+
+def _number(head: bytes, at: int) -> int:
+    """Return the number in 32 bits at a byte of a record's content; more than fits anything if it is not there."""
+    return int(_U32.unpack_from(head, at)[0]) if at + _U32.size <= len(head) else 1 << 64

@@ -1,0 +1,317 @@
+"""What a pass through a ROS 1 bag finds, record by record: for bags without an index that can be trusted.
+
+Chunks stay where they are and are decompressed one at a time. The index that follows each chunk is used as a witness:
+it says how many messages there should be, and when each was recorded.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import BinaryIO, NamedTuple, Protocol
+
+from replay.skip_cause import SkipCause
+from replay.sources.losses import Loss, Losses
+from replay.sources.rosbag1_chunks import ChunkPlace, Problem, read_chunk, records_in
+from replay.sources.rosbag1_records import (
+    CHUNK,
+    CHUNK_INFO,
+    CONNECTION,
+    INDEX,
+    MESSAGE,
+    Record,
+    fields_of,
+    find_of,
+    index_rows,
+    is_unfinished,
+    record_of,
+)
+from replay.sources.topics import normalised_type
+
+_OUTER = (INDEX, CHUNK, CHUNK_INFO, CONNECTION)
+# Kinds that are never within a chunk.
+_SURE_OUTER = (INDEX, CHUNK, CHUNK_INFO)
+_MOST_DEFINITION_BYTES = 1 << 24
+
+
+class Entry(NamedTuple):
+    """Where a message is; sorts by time, then as written."""
+
+    log_time_ns: int
+    chunk: int
+    inner: int
+    connection: int
+
+
+@dataclass(frozen=True, slots=True)
+class BagFile:
+    """An open bag, where its first record is, and where its index should be; 0 if that is not known."""
+
+    file: BinaryIO
+    size: int
+    start: int
+    index_pos: int
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """What a connection says of its messages; ``definition`` is the text of their type."""
+
+    name: str
+    msgtype: str
+    definition: str
+
+
+class Contents(Protocol):
+    """What is known of a bag, by its index or by a pass through it."""
+
+    @property
+    def topics(self) -> Mapping[int, Topic]:
+        """Connections by id."""
+
+    @property
+    def chunks(self) -> Mapping[int, ChunkPlace]:
+        """Chunks by their byte in the file."""
+
+    def counts(self) -> Mapping[int, int]:
+        """Return how many messages each connection has."""
+
+    def times_ns(self) -> tuple[int, int] | None:
+        """Return the times of the first and last message; None if there is none."""
+
+    def entries(self, connections: Collection[int]) -> list[Entry]:
+        """Return where the messages of these connections are, sorted."""
+
+
+def normalised_topic(name: str) -> str:
+    """Return a topic's name without the slashes that say nothing."""
+    return f"{'/' * name.startswith('/')}{'/'.join(part for part in name.split('/') if part)}"
+
+
+class Scan:
+    """What a pass through a bag found.
+
+    Parameters
+    ----------
+    losses
+        Takes what cannot be used.
+    most_bytes
+        How many bytes a chunk may have, decompressed.
+
+    Attributes
+    ----------
+    is_cut
+        Whether the file ends within a record.
+    """
+
+    def __init__(self, file: BagFile, losses: Losses, most_bytes: int) -> None:
+        self.topics: dict[int, Topic] = {}
+        self.chunks: dict[int, ChunkPlace] = {}
+        self.is_cut = file.size <= file.start
+        # what is written when all chunks are
+        self._has_all_chunks = 0 < file.index_pos <= file.size
+        self._size = file.size
+        self._file = file.file
+        self._losses = losses
+        self._most_bytes = most_bytes
+        # time, chunk and place in it of each message, in turn, by connection
+        self._found: dict[int, array[int]] = {}
+        self._contradictory: set[int] = set()
+        self._open: _OpenChunk | None = None
+        self._pass(file.start)
+        self._finish_chunk()
+        # which the pass may have missed while it looked for the next record
+        for record in index_section(file.file, file.index_pos if self._has_all_chunks else 0):
+            if record.end <= file.size:
+                self._take(record)
+        self._drop_unknown()
+
+    @property
+    def lost_at_end(self) -> int | None:
+        """How many messages are lost because the file ends early; None if that cannot be told."""
+        return 0 if self._has_all_chunks else None
+
+    def counts(self) -> Mapping[int, int]:
+        """Return how many messages each connection has."""
+        return {key: len(rows) // 3 for key, rows in self._found.items()}
+
+    def times_ns(self) -> tuple[int, int] | None:
+        """Return the times of the first and last message; None if there is none."""
+        times = [rows[::3] for rows in self._found.values() if rows]
+        return (min(map(min, times)), max(map(max, times))) if times else None
+
+    def entries(self, connections: Collection[int]) -> list[Entry]:
+        """Return where the messages of these connections are, sorted."""
+        return sorted(
+            Entry(rows[at], rows[at + 1], rows[at + 2], key)
+            for key, rows in self._found.items()
+            if key in connections
+            for at in range(0, len(rows), 3)
+        )
+
+    def _pass(self, start: int) -> None:
+        """Go through the records of the file."""
+        while start < self._size:
+            record = record_of(self._file, start)
+            if record is not None and record.op == CHUNK:
+                start = self._take_chunk(record)
+            elif record is not None and record.op != MESSAGE and record.end <= self._size:
+                self._take(record)
+                start = record.end
+            else:
+                following = self._after_damage(start, record)
+                if following is None:
+                    return
+                start = following
+
+    def _after_damage(self, start: int, record: Record | None) -> int | None:
+        """Return where the pass goes on after what is no record, or none that ends in the file; None if it is over."""
+        following = find_of(self._file, start + 1, _SURE_OUTER)
+        is_cut = self._is_unfinished(start) if record is None else record.end > self._size
+        # Bytes that were reserved for a recording and never written are zero.
+        if following is None and (is_cut or not any(self._bytes(start, 64))):
+            self.is_cut = True
+        else:
+            self._finish_chunk()
+            until = "to the end of the file" if following is None else f"up to byte {following}"
+            detail = f"there is no record of a bag {until}"
+            self._losses.add(Loss(SkipCause.DAMAGED, f"byte {start}", detail))
+        return following
+
+    def _is_unfinished(self, start: int) -> bool:
+        return self._size - start < 1 << 17 and is_unfinished(self._bytes(start, 1 << 17))
+
+    def _bytes(self, start: int, length: int) -> bytes:
+        self._file.seek(start)
+        return self._file.read(length)
+
+    def _take(self, record: Record) -> None:
+        """Take what a record says that is no chunk."""
+        if record.op == INDEX and self._open is not None:
+            rows = list(index_rows(self._bytes(record.data, record.end - record.data)))
+            self._open.take_index(record.number(b"conn"), rows)
+        elif record.op == CONNECTION and record.end - record.data <= _MOST_DEFINITION_BYTES:
+            self._connect(record, self._bytes(record.data, record.end - record.data))
+
+    def _connect(self, record: Record, data: bytes) -> None:
+        """Take in what a connection is; one that two records describe differently is not used."""
+        fields = fields_of(data) or {}
+        texts = [fields.get(name, b"").decode("utf-8", "replace") for name in (b"type", b"message_definition")]
+        name = normalised_topic(record.fields[b"topic"].decode("utf-8", "replace"))
+        topic = Topic(name, normalised_type(texts[0]), texts[1])
+        key = record.number(b"conn")
+        if self.topics.setdefault(key, topic) != topic:
+            self._contradictory.add(key)
+
+    def _take_chunk(self, record: Record) -> int:
+        """Take the messages of a chunk; return where the pass goes on."""
+        self._finish_chunk()
+        place = self._place(record)
+        self.chunks[place.start] = place
+        self.is_cut = self.is_cut or (place.is_cut and place.end == self._size)
+        chunk = read_chunk(self._file, place, self._most_bytes)
+        found = self._open = _OpenChunk(place, chunk.problem)
+        for each in records_in(chunk.records, place):
+            if each is None:
+                found.has_gap = True
+            elif each.op == MESSAGE:
+                found.entries.append(Entry(each.time_ns, place.start, each.start, each.number(b"conn")))
+            else:
+                self._connect(each, chunk.records[each.data : each.end])
+        return place.end
+
+    def _place(self, record: Record) -> ChunkPlace:
+        """Return where a chunk is, whatever its header says of its length."""
+        size: int | None = record.number(b"size")
+        compression = record.fields[b"compression"].decode("utf-8", "replace")
+        begin = (record.start, record.data)
+        # Recorders fill in both lengths when the chunk is whole.
+        if size == 0 and record.end == record.data:
+            end = find_of(self._file, record.data, _SURE_OUTER)
+            return ChunkPlace(*begin, end or self._size, compression, None, is_cut=True)
+        if record.end <= self._size and self._is_followed(record.end):
+            return ChunkPlace(*begin, record.end, compression, size)
+        end = find_of(self._file, record.data, _SURE_OUTER)
+        if end is None and record.end > self._size:
+            return ChunkPlace(*begin, self._size, compression, size, is_cut=True)
+        if end is None or end > record.end:
+            return ChunkPlace(*begin, record.end, compression, size, has_sure_end=False)
+        return ChunkPlace(*begin, end, compression, size)
+
+    def _is_followed(self, end: int) -> bool:
+        """Tell whether a record that may follow a chunk, or the end of the file, is at a byte."""
+        record = record_of(self._file, end)
+        return (record is not None and record.op in _OUTER) or self._is_unfinished(end)
+
+    def _finish_chunk(self) -> None:
+        """Keep what was found in a chunk, once all that its index says of it is known."""
+        if self._open is None:
+            return
+        found, self._open = self._open, None
+        loss = found.finished()
+        if loss is not None:
+            self._losses.add(loss)
+        for entry in found.entries:
+            self._found.setdefault(entry.connection, array("Q")).extend(entry[:3])
+
+    def _drop_unknown(self) -> None:
+        """Leave out the messages of which nothing, or nothing that can be trusted, says what they are."""
+        for key, count in sorted(self.counts().items()):
+            if key not in self.topics:
+                detail = "no record says what these messages are"
+            elif key in self._contradictory:
+                detail = "two records say differently what these messages are"
+            else:
+                continue
+            del self._found[key]
+            self._losses.add(Loss(SkipCause.DAMAGED, f"connection {key}", detail, count))
+        for key in self._contradictory:
+            del self.topics[key]
+
+
+@dataclass(slots=True)
+class _OpenChunk:
+    """What was found in a chunk, and what its index says."""
+
+    place: ChunkPlace
+    problem: Problem | None
+    entries: list[Entry] = field(default_factory=list)
+    has_gap: bool = False
+    _indexed: Counter[int] = field(default_factory=Counter)
+    _times_ns: dict[tuple[int, int], int] = field(default_factory=dict)
+
+    def take_index(self, connection: int, rows: Collection[tuple[int, int]]) -> None:
+        """Take in an index record of this chunk."""
+        self._indexed[connection] += len(rows)
+        for time_ns, inner in rows:
+            self._times_ns[connection, inner] = time_ns
+
+    def finished(self) -> Loss | None:
+        """Leave out messages whose time the index contradicts; return what is lost of the chunk."""
+        found = len(self.entries)
+        self.entries = [each for each in self.entries if not self._is_contradicted(each)]
+        contradicted = found - len(self.entries)
+        lost = max(self._indexed.total() - len(self.entries), contradicted)
+        if self.problem is not None:
+            messages = lost if self._indexed else None
+            return Loss(self.problem.cause, self.place.name, self.problem.detail, messages)
+        if lost:
+            detail = f"its index lists {self._indexed.total()} messages, {len(self.entries)} can be told apart"
+            if contradicted:
+                detail = f"its index says another time than {contradicted} of its messages"
+            return Loss(SkipCause.DAMAGED, self.place.name, detail, lost)
+        if self.has_gap:
+            return Loss(SkipCause.DAMAGED, self.place.name, "not all of it can be told apart as messages")
+        return None
+
+    def _is_contradicted(self, entry: Entry) -> bool:
+        return self._times_ns.get((entry.connection, entry.inner), entry.log_time_ns) != entry.log_time_ns
+
+
+def index_section(file: BinaryIO, start: int) -> Iterator[Record]:
+    """Yield the records of the index at the end of a bag; none for ``start`` 0."""
+    while start and (record := record_of(file, start)) is not None and record.op in {CONNECTION, CHUNK_INFO}:
+        yield record
+        start = record.end

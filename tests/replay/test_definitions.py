@@ -1,0 +1,114 @@
+from __future__ import annotations
+
+from typing import Literal
+
+import pytest
+
+from replay.codec import ros1_typestore, ros2_typestore
+from replay.sources.base import GRID_TYPE, TF_TYPE, UPDATE_TYPE
+from replay.sources.definitions import differing_field
+
+LINE = "=" * 80
+
+
+def _standard(msgtype: str, ros: Literal[1, 2]) -> str:
+    store = ros1_typestore() if ros == 1 else ros2_typestore()
+    return store.generate_msgdef(msgtype, ros_version=ros)[0]
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+@pytest.mark.parametrize("msgtype", [GRID_TYPE, UPDATE_TYPE, TF_TYPE])
+def test_the_standard_does_not_differ_from_itself(msgtype: str, ros: Literal[1, 2]) -> None:
+    definition = _standard(msgtype, ros)
+    assert differing_field(msgtype, definition, ros) is None
+    other: Literal[1, 2] = 2 if ros == 1 else 1
+    assert "std_msgs/msg/Header" in str(differing_field(msgtype, definition, other))
+
+
+def test_the_transforms_of_old_nodes_are_the_same_type() -> None:
+    assert differing_field("tf/msg/tfMessage", _standard(TF_TYPE, 1), 1) is None
+    assert "transform" in str(differing_field("tf/msg/tfMessage", "geometry_msgs/TransformStamped transforms", 1))
+
+
+def test_what_is_not_in_the_bytes_does_not_matter() -> None:
+    head, *rest = _standard(GRID_TYPE, 2).split(LINE + "\n")
+    text = (LINE + " \n").join(
+        ["# a map\n\nint8 UNKNOWN=-1\n" + head.replace("data", "data # row by row"), *rest[::-1]]
+    )
+    assert differing_field(GRID_TYPE, text, 2) is None
+    assert differing_field(GRID_TYPE, text.replace("\n", "\r\n"), 2) is None
+    assert differing_field(GRID_TYPE, text.replace("int8[]", "int8[<=1000]"), 2) is None
+    assert differing_field(GRID_TYPE, head, 2) is None
+
+
+@pytest.mark.parametrize("text", ["", "\n", "\0", " \r\n"])
+def test_nothing_is_taken_as_the_standard(text: str) -> None:
+    assert differing_field(GRID_TYPE, text, 2) is None
+
+
+def test_other_types_have_nothing_to_differ_from() -> None:
+    assert differing_field("my_msgs/msg/Odd", "int32 x", 2) is None
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "expected"),
+    [
+        ("float32 resolution", "float64 resolution", "resolution of nav_msgs/msg/MapMetaData is float64 in the rec"),
+        ("int8[] data", "uint8[] data", "data of nav_msgs/msg/OccupancyGrid is uint8[] in the rec"),
+        ("int8[] data", "int8[4] data", "data of nav_msgs/msg/OccupancyGrid is int8[4] in the rec"),
+        ("int8[] data", "int8[] cells", "a field of nav_msgs/msg/OccupancyGrid is cells in the rec"),
+        ("uint32 width\nuint32 height", "uint32 height\nuint32 width", "is height in the recording, width in the stan"),
+        ("int8[] data\n", "int8[] data\nint8 kind\n", "has the field kind in the recording"),
+        ("int8[] data\n", "", "has no field data"),
+        ("geometry_msgs/Pose origin", "geometry_msgs/Point origin", "origin of nav_msgs/msg/MapMetaData is"),
+        ("float64 w", "float32 w", "w of geometry_msgs/msg/Quaternion is float32"),
+        ("nav_msgs/MapMetaData info", "my_msgs/MapMetaData info", "is my_msgs/msg/MapMetaData in the rec"),
+    ],
+)
+def test_what_differs_is_named(before: str, after: str, expected: str) -> None:
+    definition = _standard(GRID_TYPE, 2)
+    assert before in definition
+    assert expected in str(differing_field(GRID_TYPE, definition.replace(before, after), 2))
+
+
+def test_what_is_no_definition_is_not_taken_for_one() -> None:
+    for text in ("{", "int8 data", "module x {", f"{LINE}\nIDL: a/msg/B\nmodule a {{", "x" * 1_000_000):
+        assert differing_field(GRID_TYPE, text, 2) is not None
+
+
+IDL = f"""\
+{LINE}
+IDL: map_msgs/msg/OccupancyGridUpdate
+// generated
+#include "std_msgs/msg/Header.idl"
+
+module map_msgs {{
+  module msg {{
+    struct OccupancyGridUpdate {{
+      std_msgs::msg::Header header;
+      int32 x;
+      int32 y;
+      uint32 width;
+      uint32 height;
+      sequence<int8> data;
+    }};
+  }};
+}};
+{LINE}
+IDL: std_msgs/msg/Header
+module std_msgs {{
+  module msg {{
+    struct Header {{
+      builtin_interfaces::msg::Time stamp;
+      string frame_id;
+    }};
+  }};
+}};
+"""
+
+
+def test_definitions_in_idl() -> None:
+    assert differing_field(UPDATE_TYPE, IDL, 2) is None
+    assert differing_field(UPDATE_TYPE, IDL.partition("IDL: std_msgs")[0].split("Update\n", 1)[1], 2) is None
+    assert "width" in str(differing_field(UPDATE_TYPE, IDL.replace("uint32 width", "uint16 width"), 2))
+    assert "stamp" in str(differing_field(UPDATE_TYPE, IDL.replace("Time stamp", "Duration stamp"), 2))
