@@ -11,11 +11,16 @@ import numpy as np
 
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
+from mapmerge.prepare import FREE_SPACING_M
 
-CELL_BYTES = 12
-"""Of each cell of a map as it came: itself, its copy at another resolution and what that takes on the way."""
+CELL_BYTES = 3
+"""Of each cell of a map as it came: itself, and its copy on the merged map."""
+POOLED_CELL_BYTES = 20
+"""Of each cell of a map that is finer than it is matched at: what pooling takes on the way."""
 WORKING_CELL_BYTES = 12
 """Of each cell at the resolution at which maps are matched: its class, and what a point there meets."""
+FREE_BYTES = 80
+"""Of each square of `FREE_SPACING_M`: a point of free space."""
 WALL_BYTES = 200
 """Of each square of `SearchConfig.wall_spacing_m` with a wall in it: where it is, how it runs, what is near."""
 CANVAS_CELL_BYTES = 8
@@ -39,4 +44,7 @@ def _needed_bytes(grid: Grid, walls: int, config: MergeConfig) -> int:
     spacing_m = max(config.search.wall_spacing_m, working_m)
     squares = min(walls, area_m2 / spacing_m**2)
     working_cells = area_m2 / working_m**2
-    return int(grid.cells.size * CELL_BYTES + working_cells * WORKING_CELL_BYTES + squares * WALL_BYTES)
+    samples = working_cells / max(1, round(FREE_SPACING_M / working_m)) ** 2
+    cell_bytes = CELL_BYTES + (POOLED_CELL_BYTES if grid.resolution_m < working_m else 0)
+    kept_bytes = working_cells * WORKING_CELL_BYTES + samples * FREE_BYTES + squares * WALL_BYTES
+    return int(grid.cells.size * cell_bytes + kept_bytes)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NoReturn
 from replay import __version__
 from replay.arguments import output_options, parser, run_options
 from replay.errors import OutputError, ReplayError, UsageError
+from replay.plain_text import plain
 
 if TYPE_CHECKING:
     from replay.events import Report
@@ -35,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except ReplayError as error:
-        print(f"replay: error: {error}", file=sys.stderr)
+        print(f"replay: error: {plain(str(error))}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
         print("replay: interrupted; nothing was written", file=sys.stderr)
@@ -125,7 +126,7 @@ def _info(options: argparse.Namespace) -> int:
 
     summary = summarise(run_options(options))
     for line in lines(summary):
-        print(line)
+        print(plain(line))
     return EXIT_DONE
 
 

@@ -11,6 +11,7 @@ from replay.codec import decode
 from replay.errors import BadMessage, ReplayError
 from replay.messages import GridMessage
 from replay.options import RunOptions
+from replay.plain_text import listed, plain
 from replay.plan import open_plan
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
@@ -166,12 +167,12 @@ def lines(summary: RunSummary) -> Iterator[str]:
 def _row(topic: TopicSummary) -> tuple[str, ...]:
     sizes = " → ".join(f"{cols} × {rows}" for cols, rows in topic.sizes)
     return (
-        topic.name,
-        topic.msgtype,
+        plain(topic.name),
+        plain(topic.msgtype),
         counted(topic.messages, "message") + (f" ({topic.unusable} unusable)" if topic.unusable else ""),
         sizes,
         ", ".join(f"{resolution:g} m" for resolution in topic.resolutions_m),
-        f"frame {', '.join(topic.frames)}" if any(topic.frames) else "no frame",
+        plain(f"frame {listed(topic.frames)}") if any(topic.frames) else "no frame",
         "header times" if topic.header_times else "log times only",
     )
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from replay.errors import InputError, UsageError
+from replay.plain_text import listed
 from replay.robot_names import file_names, is_costmap_or_mask, names_in, namespace
 from replay.runs import RunPath, TopicChoice
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, SourceInfo
@@ -202,7 +203,8 @@ def _refuse_shared(selected: Sequence[Selected]) -> None:
 
 def _flags(topics: Mapping[str, Iterable[str]]) -> str:
     """Return the topics of each robot as flags to paste."""
-    return "  ".join(f"--topic {robot}={topic}" for robot in sorted(topics) for topic in sorted(set(topics[robot])))
+    flags = [f"--topic {robot}={topic}" for robot in sorted(topics) for topic in sorted(set(topics[robot]))]
+    return listed(flags, "  ")
 
 
 def _nothing(runs: Sequence[RunPath], infos: Sequence[SourceInfo]) -> str:
@@ -211,5 +213,5 @@ def _nothing(runs: Sequence[RunPath], infos: Sequence[SourceInfo]) -> str:
     if UPDATE_TYPE in types:
         what = "only updates of parts of maps, no full map"
     else:
-        what = f"no map, only {', '.join(types)}" if types else "no messages"
+        what = f"no map, only {listed(types)}" if types else "no messages"
     return f"{paths}: {what}; expected a topic of type {GRID_TYPE}, such as /r1/map"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 
+from replay.plain_text import listed
+
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -18,12 +20,12 @@ def intention(robots: Sequence[str], form: str) -> str:
     reference, *others = robots
     if not others:
         return f"there is only one map, {reference}: nothing to merge it with"
-    return form.format(", ".join(others), f"{reference}, the reference")
+    return form.format(listed(others), f"{reference}, the reference")
 
 
 def unused(topics: Sequence[str]) -> str:
     """Return which map topics are left out, and how to use one."""
-    return f"not used: {', '.join(topics)}; to use one, say whose it is, as --topic r1={topics[0]}"
+    return f"not used: {listed(topics)}; to use one, say whose it is, as --topic r1={topics[0]}"
 
 
 def lost(messages: int | None) -> str:

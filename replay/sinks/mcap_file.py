@@ -32,6 +32,7 @@ from replay.codec import (
 )
 from replay.events import Event, Finished, Merged, Report, RobotInput, RobotPicture, Started
 from replay.options import OutputOptions
+from replay.plain_text import plain, plain_json
 from replay.plan import MERGED_FRAME
 from replay.sinks.partial_file import PartialFile, output_errors
 from replay.sinks.qos import LATCHED, VOLATILE
@@ -44,6 +45,7 @@ REPORT_SCHEMA = "report.schema.json"
 
 _CHUNK_BYTES = 4 << 20
 _NO_SCHEMA = 0
+_LONGEST_PART = 200
 
 
 class McapSink:
@@ -217,8 +219,8 @@ def topic_parts(robots: Sequence[str]) -> dict[str, str]:
     """Return each robot's name as a part of topics: letters, digits, underscores and slashes only, no two alike."""
     parts: dict[str, str] = {}
     for robot in robots:
-        part = re.sub(r"[^A-Za-z0-9_/]", "_", robot).strip("/")
-        part = f"_{part}" if part[:1].isdigit() else part
+        part = re.sub(r"/+", "/", re.sub(r"[^A-Za-z0-9_/]", "_", robot)).strip("/")[:_LONGEST_PART] or "_"
+        part = "/".join(f"_{each}" if each[:1].isdigit() else each for each in part.split("/") if each)
         while part in (MERGED_FRAME, *parts.values()):
             part += "_"
         parts[robot] = part
@@ -228,7 +230,7 @@ def topic_parts(robots: Sequence[str]) -> dict[str, str]:
 def _provenance(event: Started) -> dict[str, str]:
     return {
         "version": __version__,
-        "reference": event.robots[0].robot,
+        "reference": plain(event.robots[0].robot),
         "robots": _compact([item.robot for item in event.robots]),
         "settings": _compact(event.settings),
         "inputs": _compact([_named(item) for item in event.inputs]),
@@ -240,4 +242,4 @@ def _named(item: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _compact(value: Mapping[str, Any] | Sequence[Any]) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return plain_json(json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":")))

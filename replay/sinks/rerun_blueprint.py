@@ -69,7 +69,7 @@ def _words() -> Part:
 def _pictures(entities: RobotEntities, steps: Sequence[str]) -> Part:
     """Show the last step large, as it is the outcome, and those before it beside it."""
     views = [rrb.Spatial2DView(name=step.replace("_", " "), origin=_path([*entities.evidence, step])) for step in steps]
-    name = f"Match of {entities.robot}"
+    name = f"Match of {entities.label_text}"
     if len(views) == 1:
         return rrb.Vertical(*views, name=name)
     before = rrb.Grid(*views[:-1], grid_columns=1 + (len(views) - 1) // 4)

@@ -22,6 +22,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from replay.plain_text import escaped, plain
+
 EntityPath = list[str]
 Rgb = tuple[int, int, int]
 
@@ -72,9 +74,19 @@ class RobotEntities:
         return red, green, blue
 
     @property
+    def part(self) -> str:
+        """Its name as a part of paths."""
+        return escaped(self.robot)
+
+    @property
+    def label_text(self) -> str:
+        """Its name to read."""
+        return plain(self.robot)
+
+    @property
     def frame(self) -> EntityPath:
         """The robot's map frame."""
-        return [*MERGED, "robots", self.robot]
+        return [*MERGED, "robots", self.part]
 
     @property
     def map(self) -> EntityPath:
@@ -94,13 +106,13 @@ class RobotEntities:
     @property
     def label(self) -> EntityPath:
         """Its name."""
-        return [*MERGED, "labels", self.robot]
+        return [*MERGED, "labels", self.part]
 
     @property
     def evidence(self) -> EntityPath:
         """Parent of its pictures."""
-        return [*EVIDENCE, self.robot]
+        return [*EVIDENCE, self.part]
 
     def plot(self, quantity: str, *, placed: bool) -> EntityPath:
         """Its line while it is placed, or the points of its best refused candidates."""
-        return [*PLOTS, quantity, "placed" if placed else "refused", self.robot]
+        return [*PLOTS, quantity, "placed" if placed else "refused", self.part]

@@ -158,7 +158,7 @@ class MapScene:
                 shown.label = None
                 self._stream.log(entities.label, rr.Clear(recursive=False))
             return
-        text = _label(entities.robot, outcome)
+        text = _label(entities.label_text, outcome)
         if shown.label == (text, at_m):
             return
         shown.label = (text, at_m)

@@ -73,11 +73,11 @@ class Plots:
         # The reference agrees with the others as they do with it: its line is wide, so that theirs are seen on it.
         width = _WIDTH if entities.index else _REFERENCE_WIDTH
         line = rr.SeriesLines(
-            colors=[entities.colour], widths=[width], names=[entities.robot], interpolation_mode="StepAfter"
+            colors=[entities.colour], widths=[width], names=[entities.label_text], interpolation_mode="StepAfter"
         )
         self._stream.log(entities.plot(quantity, placed=True), line, static=True)
         points = rr.SeriesPoints(
-            colors=[entities.colour], markers=["cross"], marker_sizes=[4.0], names=[f"{entities.robot}, refused"]
+            colors=[entities.colour], markers=["cross"], marker_sizes=[4.0], names=[f"{entities.label_text}, refused"]
         )
         self._stream.log(entities.plot(quantity, placed=False), points, static=True)
 

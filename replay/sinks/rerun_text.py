@@ -11,6 +11,7 @@ from mapmerge.merger import MergeResult
 from mapmerge.outcome import Change, ChangeKind
 from mapmerge.sim2 import Sim2
 from replay.events import Noted, Report, Skipped
+from replay.plain_text import plain, plain_json
 from replay.words import lost
 
 INFO, WARN = "INFO", "WARN"
@@ -29,14 +30,14 @@ def decisions(result: MergeResult) -> Iterator[Entry]:
 def skipped(event: Skipped) -> Entry:
     """Say which message, or part of a recording, was not used, and why."""
     if event.place:
-        return WARN, f"{event.input}: {lost(event.messages)} ({event.place}): {event.detail}"
+        return WARN, plain(f"{event.input}: {lost(event.messages)} ({event.place}): {event.detail}")
     whose = f"{event.robot}: " if event.robot else ""
-    return WARN, f"{whose}a message of {event.topic} was skipped: {event.detail}"
+    return WARN, plain(f"{whose}a message of {event.topic} was skipped: {event.detail}")
 
 
 def noted(event: Noted) -> Entry:
     """Say what a reader should know."""
-    return WARN, f"{event.robot}: {event.message}"
+    return WARN, plain(f"{event.robot}: {event.message}" if event.robot else event.message)
 
 
 def outcome(report: Report) -> Iterator[Entry]:
@@ -98,8 +99,8 @@ def _number(value: float | None, digits: int) -> str:
 
 def _plain(text: str) -> str:
     """Return text that stays in its cell."""
-    return text.replace("|", "\\|").replace("_", "\\_").replace("\n", " ")
+    return plain(text).replace("|", "\\|").replace("_", "\\_").replace("\n", " ")
 
 
 def _block(value: Any) -> str:  # noqa: ANN401 - any JSON value
-    return f"```json\n{json.dumps(value, indent=2, ensure_ascii=False)}\n```"
+    return f"```json\n{plain_json(json.dumps(value, indent=2, ensure_ascii=False))}\n```"

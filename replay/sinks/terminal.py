@@ -10,6 +10,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from replay.events import Event, Merged, Noted, Report, Skipped, Started
+from replay.plain_text import plain
 from replay.words import counted, intention, lost, recovered, unused
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ class Narrator:
         elif isinstance(event, Skipped):
             self._say_skipped(event)
         elif isinstance(event, Noted):
-            self._say(f"{event.robot}: {event.message}")
+            self._say(f"{event.robot}: {event.message}" if event.robot else event.message)
         elif isinstance(event, Merged):
             self._merge_s += event.timing.merge_s
             self._render_s += event.timing.render_s
@@ -112,6 +113,12 @@ class Narrator:
         if skipped:
             causes = ", ".join(f"{count} {cause}" for cause, count in report["skipped"].items())
             self._say(f"{counted(skipped, 'message')} skipped: {causes}")
+        bad_stamps = sum(item["bad_stamps"] for item in report["inputs"])
+        if bad_stamps:
+            self._say(
+                f"{counted(bad_stamps, 'message')} with a time far from those around: taken at the time at which "
+                f"{'it was' if bad_stamps == 1 else 'they were'} recorded"
+            )
         if late:
             self._say(f"{counted(late, 'message')} too late to be put in order of time: taken in on arrival")
         spent_s = perf_counter() - self._begin_s
@@ -121,7 +128,7 @@ class Narrator:
         )
 
     def _say(self, text: str) -> None:
-        self._console.print(text, markup=False, soft_wrap=True)
+        self._console.print(plain(text), markup=False, soft_wrap=True)
 
     def finish(self) -> None:
         """Do nothing."""
@@ -159,13 +166,13 @@ def print_table(console: Console, report: Report) -> None:
     for robot, row in report["robots"].items():
         status = str(row["status"])
         table.add_row(
-            Text(robot),
+            Text(plain(robot)),
             Text(status, style=_STYLES[status]),
             *_pose(row["merged_from_map"])[: len(pose)],
             _share(row["acceptance"], 3),
             _figure(row["overlap_m2"], "{:.1f} m²"),
             *([_share(row["confidence"], 4)] if known else []),
-            Text(row["reason"]["message"]),
+            Text(plain(row["reason"]["message"])),
         )
     console.print(table)
 
