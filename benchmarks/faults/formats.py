@@ -145,13 +145,18 @@ class _Mcap:
             for each in what:
                 if each.msgtype not in schemas:
                     kind = each.msgtype.replace("/msg/", "/") if is_ros1 else each.msgtype
-                    text = ros2_message_definition(each.msgtype).encode()
+                    text = _definition(each.msgtype, is_ros1=is_ros1)
                     schemas[each.msgtype] = writer.register_schema(kind, "ros1msg" if is_ros1 else "ros2msg", text)
                 if each.topic not in channels:
                     channels[each.topic] = writer.register_channel(each.topic, self.encoding, schemas[each.msgtype])
                 data = each.data(self.encoding)
                 writer.add_message(channels[each.topic], each.log_time_ns, data, each.log_time_ns)
             writer.finish()  # type: ignore[no-untyped-call]
+
+
+def _definition(msgtype: str, *, is_ros1: bool) -> bytes:
+    text = ros1_typestore().generate_msgdef(msgtype)[0] if is_ros1 else ros2_message_definition(msgtype)
+    return text.encode()
 
 
 def _no_index() -> dict[str, Any]:
