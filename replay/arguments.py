@@ -21,6 +21,7 @@ examples:
   replay merge run.mcap --robots r1,r2
   replay merge alpha=alpha_bag/ bravo=bravo_bag/ -o out/floor.mcap
   replay merge today.mcap old=map.yaml --robots r1,old --require-all
+  replay recover out/floor.mcap.partial
 """
 
 _MERGE_EXAMPLES = """\
@@ -81,7 +82,29 @@ def parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     _input_arguments(info)
+    _recover_command(commands)
     return program
+
+
+def _recover_command(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    recover = commands.add_parser(
+        "recover",
+        help="make a readable MCAP of one that was cut off, such as OUT.mcap.partial",
+        usage="replay recover FILE [options]",
+        description="Write what is whole of an MCAP that was cut off to a new one: of OUT.mcap.partial, which a "
+        "run\nthat was killed left, or of any other recorder's. FILE is only read.",
+        formatter_class=_Help,
+        allow_abbrev=False,
+    )
+    recover.add_argument("file", metavar="FILE", type=Path, help="the MCAP that was cut off")
+    recover.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT.mcap",
+        type=Path,
+        help="the new MCAP (default: FILE without .partial, or NAME.recovered.mcap in the current folder)",
+    )
+    recover.add_argument("--force", action="store_true", help="replace outputs that exist")
 
 
 def _input_arguments(parser: argparse.ArgumentParser) -> None:
@@ -284,17 +307,28 @@ def _robots(text: str | None) -> tuple[str, ...] | None:
     return names
 
 
+def recovery_paths(options: argparse.Namespace) -> tuple[Path, Path]:
+    """Return the file to recover, and the new one."""
+    damaged: Path = options.file
+    whole = damaged.with_suffix("") if damaged.suffix == ".partial" else None
+    default = whole if whole and whole.suffix == ".mcap" else Path(f"{damaged.stem}.recovered.mcap")
+    return damaged, _mcap(options.output or default)
+
+
+def _mcap(path: Path) -> Path:
+    if path.suffix != ".mcap":
+        raise UsageError(f"--output {path}: expected a name that ends in .mcap")
+    return path
+
+
 def output_options(options: argparse.Namespace, run: RunOptions) -> OutputOptions:
     """Return what is to be written."""
     from replay.options import OutputOptions, seconds_to_ns
 
     first = run.runs[0].path
     stem = first.resolve().name if first.is_dir() else first.stem
-    path = options.output or Path(f"{stem}.merged.mcap")
-    if path.suffix != ".mcap":
-        raise UsageError(f"--output {path}: expected a name that ends in .mcap")
     return OutputOptions(
-        mcap=path,
+        mcap=_mcap(options.output or Path(f"{stem}.merged.mcap")),
         rrd=not options.no_rrd,
         every_ns=seconds_to_ns(options.every),
         copy_maps=options.copy_maps,

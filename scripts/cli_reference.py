@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parents[1] / "docs" / "cli.md"
-COMMANDS = ((), ("merge",), ("info",))
+COMMANDS = ((), ("merge",), ("info",), ("recover",))
 HEAD = """\
 # Command line
 

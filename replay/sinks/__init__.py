@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
+from replay.errors import UsageError
+from replay.interrupts import held_off
 from replay.options import OutputOptions
 from replay.sinks.base import Sink
-from replay.sinks.partial_file import PartialFile
+from replay.sinks.partial_file import PartialFile, partial_name
+from replay.sinks.publication import publish
 
-__all__ = ["SINKS", "Sink", "open_sinks", "output_paths"]
+__all__ = ["SINKS", "Sink", "all_output_paths", "open_sinks", "output_paths", "refuse_existing"]
 
 SINKS: dict[str, str] = {
     "mcap": "replay.sinks.mcap_file:McapSink",
     "rrd": "replay.sinks.rerun_file:RerunSink",
     "json": "replay.sinks.json_file:JsonSink",
 }
+"""In the order in which they are published: where the last one is, the others are, of the same run."""
 
 
 def output_paths(options: OutputOptions) -> dict[str, Path]:
@@ -25,24 +30,69 @@ def output_paths(options: OutputOptions) -> dict[str, Path]:
     return {name: options.mcap.with_suffix(f".{name}") for name in SINKS if name != "rrd" or options.rrd}
 
 
+def all_output_paths(options: OutputOptions) -> dict[str, Path]:
+    """Return the files that belong together under this name, also those that are not written this time."""
+    return output_paths(replace(options, rrd=True))
+
+
+def refuse_existing(options: OutputOptions) -> None:
+    """Refuse to replace what is there, unless that was asked for."""
+    existing = [str(path) for path in all_output_paths(options).values() if path.exists()]
+    if existing and not options.force:
+        raise UsageError(f"there is already {', '.join(existing)}; give --force to replace, or another --output")
+
+
 @contextmanager
-def open_sinks(options: OutputOptions, extra: Sequence[Sink] = ()) -> Iterator[tuple[Sink, ...]]:
-    """Open the sinks that were asked for; publish what they wrote if all went well, else remove it."""
+def open_sinks(
+    options: OutputOptions, extra: Sequence[Sink] = (), *, say: Callable[[str], object] = lambda _: None
+) -> Iterator[tuple[Sink, ...]]:
+    """Open the sinks that were asked for; publish what they wrote if all went well, else remove it.
+
+    Parameters
+    ----------
+    extra
+        Sinks that are open already.
+    say
+        Is told what an earlier run left and this one removes.
+    """
+    files = {name: PartialFile(path) for name, path in output_paths(options).items()}
     sinks: list[Sink] = []
-    paths = output_paths(options)
     try:
-        for name, path in paths.items():
+        for file in files.values():
+            _claim(file, say)
+        _remove_left_over(set(all_output_paths(options).values()) - {file.path for file in files.values()}, say)
+        refuse_existing(options)  # once more: another run may have published between the first time and the claim
+        for name, file in files.items():
             module, _, attribute = SINKS[name].partition(":")
-            sinks.append(getattr(import_module(module), attribute)(path, options))
+            sinks.append(getattr(import_module(module), attribute)(file, options))
         sinks.extend(extra)
         yield tuple(sinks)
         for sink in sinks:
             sink.finish()
-        for sink in sinks:
-            sink.publish()
+        with held_off():
+            refuse_existing(options)
+            publish(sinks[: len(files)], list(all_output_paths(options).values()))
+            for sink in extra:
+                sink.publish()
     except BaseException:
-        for sink in sinks:
-            sink.discard()
-        for path in paths.values():  # of a sink that was interrupted while it was opened
-            PartialFile(path).discard()
+        with held_off():
+            for sink in sinks:
+                sink.discard()
+            for file in files.values():  # of a sink that was interrupted while it was opened
+                file.discard()
         raise
+
+
+def _claim(file: PartialFile, say: Callable[[str], object]) -> None:
+    file.claim()
+    if file.replaced_bytes:
+        say(f"an earlier run was cut off and left {file.partial}; it is removed")
+
+
+def _remove_left_over(unwritten: Collection[Path], say: Callable[[str], object]) -> None:
+    """Remove what an earlier run left of files that this one does not write."""
+    for path in unwritten:
+        if partial_name(path).exists():
+            file = PartialFile(path)
+            _claim(file, say)
+            file.discard()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 from replay.events import Event, Finished, Report
 from replay.options import OutputOptions
@@ -19,19 +18,18 @@ def report_text(report: Report) -> str:
 class JsonSink:
     """Writes the final report."""
 
-    def __init__(self, path: Path, _options: OutputOptions) -> None:
-        self._file = PartialFile(path)
-        with output_errors(path):
-            self._file.partial.touch()
+    def __init__(self, file: PartialFile, _options: OutputOptions) -> None:
+        self._file = file
 
     def take(self, event: Event) -> None:
         """Write the report when the run has ended."""
         if isinstance(event, Finished):
-            with output_errors(self._file.path):
-                self._file.partial.write_text(report_text(event.report), encoding="utf-8")
+            with output_errors(self._file.path), self._file.stream() as stream:
+                stream.write(report_text(event.report).encode())
 
     def finish(self) -> None:
-        """Do nothing: the report was written at once."""
+        """Wait until the report is on the disk; it was written at once."""
+        self._file.sync()
 
     def publish(self) -> None:
         """Give the report its final name."""

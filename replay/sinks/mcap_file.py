@@ -9,15 +9,15 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
 from importlib import resources
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from mcap.exceptions import McapError
 from mcap.writer import CompressionType, Writer
+from zstandard import ZstdError
 
 from mapmerge.grid import UNKNOWN, Grid
 from mapmerge.merger import MergeResult
@@ -51,9 +51,9 @@ _LONGEST_PART = 200
 class McapSink:
     """Writes a run's outcome to an MCAP that mcap, rosbags, Rerun and Foxglove read."""
 
-    def __init__(self, path: Path, options: OutputOptions) -> None:
+    def __init__(self, file: PartialFile, options: OutputOptions) -> None:
         self._options = options
-        self._file = PartialFile(path)
+        self._file = file
         self._robots: tuple[RobotInput, ...] = ()
         self._parts: dict[str, str] = {}
         self._merged: Grid | None = None
@@ -62,13 +62,13 @@ class McapSink:
         self._pending_map: tuple[int, Grid] | None = None
         self._pending_report: tuple[int, Report] | None = None
         self._said: Mapping[str, Any] | None = None
-        with output_errors(path):
-            self._stream = self._file.partial.open("wb")
+        with output_errors(file.path):
+            self._stream = file.stream()
         self._channels = _Channels(Writer(self._stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD))
 
     def take(self, event: Event) -> None:
         """Write what a tick brought."""
-        with output_errors(self._file.path, McapError):
+        with self._errors():
             match event:
                 case Started():
                     self._robots = event.robots
@@ -81,12 +81,14 @@ class McapSink:
                     self._end(event.report)
                 case _:
                     pass
+            self._stream.flush()  # chunks that are finished outlive a run that is killed
 
     def finish(self) -> None:
         """Write the index and close the file."""
-        with output_errors(self._file.path, McapError):
+        with self._errors():
             self._channels.finish()
             self._stream.close()
+        self._file.sync()
 
     def publish(self) -> None:
         """Give the file its final name."""
@@ -97,6 +99,9 @@ class McapSink:
         with suppress(OSError):  # the disk may be full of what is still to be written
             self._stream.close()
         self._file.discard()
+
+    def _errors(self) -> AbstractContextManager[None]:
+        return output_errors(self._file.path, McapError, ZstdError)
 
     def _tick(self, event: Merged) -> None:
         self._flush_report()

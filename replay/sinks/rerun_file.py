@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from pathlib import Path
 from uuid import NAMESPACE_URL, UUID, uuid5
 
 import rerun as rr
@@ -14,9 +13,10 @@ from mapmerge.match import CALIBRATED
 from replay.events import Event, Finished, Merged, Noted, Report, RobotPicture, Skipped, Started
 from replay.options import NS_PER_S, OutputOptions
 from replay.sinks import rerun_text as text
-from replay.sinks.partial_file import PartialFile, output_errors
+from replay.sinks.partial_file import PartialFile
 from replay.sinks.rerun_blueprint import Span, blueprint
 from replay.sinks.rerun_entities import ABOUT, DECISIONS, ROBOTS, RobotEntities
+from replay.sinks.rerun_errors import rerun_errors
 from replay.sinks.rerun_maps import MapScene
 from replay.sinks.rerun_plots import Plots
 from replay.sinks.rerun_stream import RrdStream
@@ -27,25 +27,24 @@ _MARKDOWN = rr.MediaType.MARKDOWN
 class RerunSink:
     """Writes the maps, pictures, numbers and decisions of a run, and what the viewer shows of them."""
 
-    def __init__(self, path: Path, _options: OutputOptions) -> None:
-        self._file = PartialFile(path)
+    def __init__(self, file: PartialFile, _options: OutputOptions) -> None:
+        self._file = file
         self._writer: _Writer | None = None
-        with output_errors(path):
-            self._file.partial.touch()
 
     def take(self, event: Event) -> None:
         """Log what happened; the library writes it to the file in the meantime."""
-        with output_errors(self._file.path, RuntimeError):
+        with rerun_errors(self._file.path):
             if isinstance(event, Started):
-                self._writer = _Writer(self._file.partial, event)
+                self._writer = _Writer(self._file, event)
             elif self._writer is not None:
                 self._writer.take(event)
 
     def finish(self) -> None:
         """Make the file whole."""
-        with output_errors(self._file.path, RuntimeError):
+        with rerun_errors(self._file.path):
             if self._writer is not None:
                 self._writer.finish()
+        self._file.sync()
 
     def publish(self) -> None:
         """Give the recording its final name."""
@@ -61,10 +60,10 @@ class RerunSink:
 class _Writer:
     """Logs a run whose robots are known."""
 
-    def __init__(self, path: Path, started: Started) -> None:
+    def __init__(self, file: PartialFile, started: Started) -> None:
         merge = started.settings["merge"]
         robots = [RobotEntities(item.robot, index) for index, item in enumerate(started.robots)]
-        self.stream = RrdStream(path, _recording_id(started))
+        self.stream = RrdStream(file, _recording_id(started))
         self._robots = {entities.robot: entities for entities in robots}
         self._maps = MapScene(self.stream, robots, CellConfig(**merge["cells"]))
         limit_of = "confidence" if merge["method"] in CALIBRATED else "acceptance"

@@ -1,10 +1,9 @@
-"""The Rerun library's file writer: data in at times of the recording, one file out, errors as they should be."""
+"""The Rerun library's writer: data in at times of the recording, one file out, errors as they should be."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import timedelta
-from pathlib import Path
 from threading import Thread
 from uuid import UUID
 
@@ -12,6 +11,9 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
+
+from replay.sinks.partial_file import PartialFile
+from replay.sinks.rerun_outlet import outlet_to
 
 APPLICATION = "replay"
 TIMELINE = "log_time"
@@ -35,7 +37,7 @@ class RrdStream:
 
     Parameters
     ----------
-    path
+    file
         The file.
     recording_id
         The same for the same input, so that two runs can be compared.
@@ -46,8 +48,8 @@ class RrdStream:
         If the file cannot be opened.
     """
 
-    def __init__(self, path: Path, recording_id: UUID) -> None:
-        self._path = path
+    def __init__(self, file: PartialFile, recording_id: UUID) -> None:
+        self._file = file
         # Rows go to chunks by their size and never by the clock, so that two runs have the same chunks. Of each chunk
         # something is kept until the end, so small rows share one.
         batching = rr.ChunkBatcherConfig(_NEVER, _CHUNK_BYTES, _NO_LIMIT)
@@ -56,10 +58,14 @@ class RrdStream:
         )
         self._recording.set_log_time_enabled(False)
         self._recording.set_log_tick_enabled(False)
-        self._recording.save(path)
         self._ticks = 0
         self._waiting_bytes = 0
         self._broken = False
+        self._outlet = outlet_to(file)
+        try:
+            self._recording.save(self._outlet.path)
+        finally:
+            self._outlet.opened()
 
     def at(self, stamp_ns: int) -> None:
         """Set the time of what is logged from now on."""
@@ -74,9 +80,10 @@ class RrdStream:
 
         Raises
         ------
-        RuntimeError
+        RuntimeError, OSError
             If what was logged before cannot be written.
         """
+        self._outlet.check()
         batches = [batch for item in content for batch in item.as_component_batches()]
         size_bytes = _ROW_BYTES + sum(batch.as_arrow_array().nbytes for batch in batches)
         if self._waiting_bytes + size_bytes > _MOST_WAITING_BYTES:
@@ -89,27 +96,29 @@ class RrdStream:
         self._recording.send_blueprint(blueprint, make_active=True, make_default=True)
 
     def flush(self) -> None:
-        """Wait until all that was logged is in the file.
+        """Wait until all that was logged is on its way to the file.
 
         Raises
         ------
-        RuntimeError
+        RuntimeError, OSError
             If it does not get there.
         """
-        # The library's writer is a thread. When it fails, on a full disk say, whatever waits for it waits for ever:
-        # so wait only while the file grows.
+        # Where the library writes the file itself, and fails, whatever waits for it waits for ever: so wait only while
+        # it writes.
         self._waiting_bytes = 0
-        size = self._path.stat().st_size
+        written = self._outlet.written_bytes()
         while True:
             try:
                 self._recording.flush(timeout_sec=_PATIENCE_S)
             except RuntimeError as error:
-                grown = self._path.stat().st_size
-                if grown > size:
-                    size = grown
+                more = self._outlet.written_bytes()
+                if more > written:
+                    written = more
                     continue
                 self._abandon()
+                self._outlet.check()
                 raise _not_written(error) from error
+            self._outlet.check()
             return
 
     def finish(self) -> None:
@@ -117,21 +126,23 @@ class RrdStream:
 
         Raises
         ------
-        RuntimeError
+        RuntimeError, OSError
             If not all of it could be written.
         """
         self.flush()
         self.close()
+        self._outlet.check()
         try:
             # The library tells nobody when it fails to write the end of the file; without that this raises.
-            RrdReader(self._path).store()
-        except RuntimeError as error:
+            RrdReader(self._file.partial).store()
+        except (RuntimeError, ValueError) as error:
             raise _not_written(error) from error
 
     def close(self) -> None:
         """Release the file as it is; harmless at any time."""
         if not self._broken:
             self._recording.disconnect()
+            self._outlet.close()
 
     def _abandon(self) -> None:
         """Let go of a recording whose writer has failed: closing it and ending the process could both hang."""

@@ -85,13 +85,13 @@ class Narrator:
     def take(self, event: Event) -> None:
         """Say what is worth a line, and add up the time."""
         if isinstance(event, Started) and self._announce:
-            self._say(intention([f"{item.robot} ({item.topic})" for item in event.robots], "merging {} into {}"))
+            self.say(intention([f"{item.robot} ({item.topic})" for item in event.robots], "merging {} into {}"))
             if self._unused:
-                self._say(unused(self._unused))
+                self.say(unused(self._unused))
         elif isinstance(event, Skipped):
             self._say_skipped(event)
         elif isinstance(event, Noted):
-            self._say(f"{event.robot}: {event.message}" if event.robot else event.message)
+            self.say(f"{event.robot}: {event.message}" if event.robot else event.message)
         elif isinstance(event, Merged):
             self._merge_s += event.timing.merge_s
             self._render_s += event.timing.render_s
@@ -102,32 +102,33 @@ class Narrator:
         self._skipped[event.cause] += 1
         if self._skipped[event.cause] <= _SKIPPED_NAMED:
             what = "skipped a message" if event.messages == 1 else lost(event.messages)
-            self._say(f"{what} ({event.input}, {event.where}): {event.cause}: {event.detail}")
+            self.say(f"{what} ({event.input}, {event.where}): {event.cause}: {event.detail}")
 
     def sum_up(self, report: Report, paths: Sequence[str]) -> None:
         """Say what was skipped, how long it took, and what was written."""
         for item in report["inputs"]:
             if any(each["cause"] == "ends_early" and each["input"] == item["name"] for each in report["skipped_at"]):
-                self._say(recovered(item["name"], item["messages"], item["until_ns"]))
+                self.say(recovered(item["name"], item["messages"], item["until_ns"]))
         skipped, late = sum(report["skipped"].values()), sum(item["late"] for item in report["inputs"])
         if skipped:
             causes = ", ".join(f"{count} {cause}" for cause, count in report["skipped"].items())
-            self._say(f"{counted(skipped, 'message')} skipped: {causes}")
+            self.say(f"{counted(skipped, 'message')} skipped: {causes}")
         bad_stamps = sum(item["bad_stamps"] for item in report["inputs"])
         if bad_stamps:
-            self._say(
+            self.say(
                 f"{counted(bad_stamps, 'message')} with a time far from those around: taken at the time at which "
                 f"{'it was' if bad_stamps == 1 else 'they were'} recorded"
             )
         if late:
-            self._say(f"{counted(late, 'message')} too late to be put in order of time: taken in on arrival")
+            self.say(f"{counted(late, 'message')} too late to be put in order of time: taken in on arrival")
         spent_s = perf_counter() - self._begin_s
-        self._say(
+        self.say(
             f"{counted(report['updates'], 'map')} at {counted(self._ticks, 'time')} in {spent_s:.1f} s: "
             f"{self._merge_s:.1f} s merging, {self._render_s:.1f} s drawing; wrote {', '.join(paths)}"
         )
 
-    def _say(self, text: str) -> None:
+    def say(self, text: str) -> None:
+        """Say a line."""
         self._console.print(plain(text), markup=False, soft_wrap=True)
 
     def finish(self) -> None:

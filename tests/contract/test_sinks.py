@@ -14,6 +14,8 @@ from replay.events import Event
 from replay.options import OutputOptions
 from replay.pipeline import drain
 from replay.sinks import SINKS, Sink, open_sinks, output_paths
+from replay.sinks.partial_file import PartialFile
+from tests.disks import files_up_to
 from tests.scenarios import SCENARIOS, events_of
 
 Opens = Callable[..., Sink]
@@ -33,7 +35,7 @@ def path(name: str, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def open_sink(name: str, path: Path) -> Opens:
-    return lambda **options: sink_class(name)(path, OutputOptions(path, **options))
+    return lambda **options: sink_class(name)(PartialFile.claimed(path), OutputOptions(path, **options))
 
 
 def sink_class(name: str) -> Opens:
@@ -167,14 +169,14 @@ class TestErrors:
         self.refused(path, open_sink)
 
     def test_a_full_disk(self, open_sink: Opens, path: Path) -> None:
-        path.with_name(f"{path.name}.partial").symlink_to("/dev/full")
-        self.refused(path, open_sink)
+        with files_up_to(64):
+            self.refused(path, open_sink)
         assert files(path) == []
 
     def test_a_name_that_is_too_long(self, name: str, path: Path) -> None:
         long = path.with_name(f"{'n' * 300}.{name}")
         with pytest.raises(OutputError, match="File name too long"):
-            sink_class(name)(long, OutputOptions(long))
+            sink_class(name)(PartialFile.claimed(long), OutputOptions(long))
 
 
 class TestTogether:
@@ -199,17 +201,18 @@ class TestTogether:
         assert list(tmp_path.iterdir()) == []
 
     def test_none_if_one_cannot_be_opened(self, tmp_path: Path) -> None:
-        (tmp_path / "run.json.partial").symlink_to(tmp_path / "nowhere" / "at all")
-        with pytest.raises(OutputError), open_sinks(self.outputs(tmp_path)):
+        in_the_way = tmp_path / "run.json.partial"
+        in_the_way.symlink_to(tmp_path / "nowhere" / "at all")
+        with pytest.raises(OutputError, match="is a link"), open_sinks(self.outputs(tmp_path)):
             pass
-        assert list(tmp_path.iterdir()) == []
+        assert list(tmp_path.iterdir()) == [in_the_way]
 
     def test_none_if_one_is_interrupted_while_it_is_opened(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         class Interrupted:
-            def __init__(self, path: Path, _options: OutputOptions) -> None:
-                path.with_name(f"{path.name}.partial").touch()
+            def __init__(self, file: PartialFile, _options: OutputOptions) -> None:
+                file.stream().close()
                 raise KeyboardInterrupt
 
         monkeypatch.setattr("replay.sinks.json_file.JsonSink", Interrupted)

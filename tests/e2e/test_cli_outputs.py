@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.bags import write_mcap, write_rosbag2
+from tests.disks import small_disk
 from tests.program import Program
 from tests.runs import two_robots
 
@@ -96,6 +99,27 @@ class TestInputsAreNeverWritten:
         for run, output in (("run.mcap", "link.mcap"), ("link.mcap", "run.mcap")):
             assert "is an input" in replay("merge", run, "-o", output, "--no-rrd", "--force").error
 
+    @pytest.mark.parametrize("link", [Path.symlink_to, Path.hardlink_to])
+    @pytest.mark.parametrize("name", ["out.mcap", "out.rrd", "out.json", "out.mcap.partial", "out.json.partial"])
+    def test_through_any_link(
+        self, replay: Program, two: Path, tmp_path: Path, name: str, link: Callable[[Path, Path], None]
+    ) -> None:
+        run = shutil.copy(two, tmp_path / "run.mcap")
+        link(tmp_path / name, run)
+        ran = replay.merge(run)
+        assert ran.status == 2
+        assert f"{name} is an input" in ran.error
+        assert run.read_bytes() == two.read_bytes()
+        assert names(tmp_path) == sorted([name, "run.mcap"])
+
+    def test_through_a_link_to_a_part_of_a_bag(self, replay: Program, tmp_path: Path) -> None:
+        bag = write_rosbag2(tmp_path / "bag", two_robots(), "mcap")
+        (part,) = bag.glob("*.mcap")
+        kept = part.read_bytes()
+        (tmp_path / "out.mcap").hardlink_to(part)
+        assert "is an input" in replay.merge(bag).error
+        assert part.read_bytes() == kept
+
     def test_under_the_temporary_name(self, replay: Program, two: Path, tmp_path: Path) -> None:
         shutil.copy(two, tmp_path / "run.mcap.partial")
         ran = replay("merge", "run.mcap.partial", "-o", "run.mcap", "--no-rrd", "--force")
@@ -138,12 +162,18 @@ class TestWhereNothingCanBeWritten:
         assert names(tmp_path) == [name]
 
     def test_a_full_disk(self, replay: Program, two: Path, tmp_path: Path) -> None:
-        for name in ("out.mcap.partial", "out.json.partial"):
-            (tmp_path / name).symlink_to("/dev/full")
-            ran = replay.merge(two)
-            assert ran.status == 3
-            assert "No space left" in ran.err.splitlines()[-1]
-            assert not names(tmp_path)
+        outputs = ("-o", tmp_path / "disk" / "out.mcap", "--images", "changed")
+        statuses = []
+        with small_disk(tmp_path / "disk", 8 << 20) as disk:
+            for size_bytes in (4096, 64 << 10, 256 << 10, 8 << 20):
+                subprocess.run(["mount", "-o", f"remount,size={size_bytes}", disk], check=True)
+                ran = replay("merge", two, *outputs)
+                statuses.append(ran.status)
+                if ran.status:
+                    assert ran.err.splitlines()[-1].startswith(f"replay: error: {disk}/out.")
+                    assert ran.err.endswith("cannot be written: No space left on device\n")
+                    assert not names(disk)
+        assert statuses == [3, 3, 3, 0]
 
 
 def test_nothing_is_written_before_the_recording_was_understood(replay: Program, tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from replay.options import OutputOptions
 from replay.pipeline import drain
 from replay.sinks.json_file import report_text
 from replay.sinks.mcap_file import McapSink, topic_parts
+from replay.sinks.partial_file import PartialFile
 from tests.bags import SECOND
 from tests.outputs import maps, metadata, raw, reports, same_map, summary, topics, transforms
 from tests.runs import at, flat_map, is_right, reference_from
@@ -43,7 +44,7 @@ TYPES = {
 
 
 def write(path: Path, scenario: str = "merged", **options: Any) -> Path:
-    sink = McapSink(path, OutputOptions(path, **options))
+    sink = McapSink(PartialFile.claimed(path), OutputOptions(path, **options))
     drain(events_of(scenario), [sink])
     sink.finish()
     sink.publish()
@@ -234,7 +235,7 @@ class TestReports:
         ]
         assert isinstance(finished, Finished)
         ended = Finished({**finished.report, "stamp_ns": last.stamp_ns + 2})
-        sink = McapSink(path, OutputOptions(path))
+        sink = McapSink(PartialFile.claimed(path), OutputOptions(path))
         drain([*before, last, *later, ended], [sink])
         sink.finish()
         sink.publish()

@@ -26,6 +26,7 @@ from replay.events import Event, Finished, Merged, Noted, RobotInput, Skipped, S
 from replay.gallery import Gallery
 from replay.options import OutputOptions, RunOptions
 from replay.report import ReportBuilder
+from replay.sinks.partial_file import PartialFile
 from replay.sinks.rerun_file import RerunSink
 from replay.sinks.rerun_layout import Box, lay_out
 from replay.sinks.rerun_maps import MAX_SIDE_CELLS
@@ -85,7 +86,7 @@ def story() -> list[Event]:
 
 
 def written(path: Path, events: Sequence[Event]) -> Path:
-    sink = RerunSink(path, OutputOptions(path.with_suffix(".mcap")))
+    sink = RerunSink(PartialFile.claimed(path), OutputOptions(path.with_suffix(".mcap")))
     for event in events:
         sink.take(event)
     sink.finish()
@@ -354,7 +355,7 @@ def test_a_run_without_pictures_has_no_views_for_them(story: list[Event], tmp_pa
 
 def test_the_final_name_is_given_only_when_published(story: list[Event], tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
-    sink = RerunSink(path, OutputOptions(tmp_path / "run.mcap"))
+    sink = RerunSink(PartialFile.claimed(path), OutputOptions(tmp_path / "run.mcap"))
     for event in story[:3]:
         sink.take(event)
     assert [each.name for each in tmp_path.iterdir()] == ["run.rrd.partial"]
@@ -365,7 +366,7 @@ def test_the_final_name_is_given_only_when_published(story: list[Event], tmp_pat
 
 def test_a_folder_that_is_not_there_is_an_output_error(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"run\.rrd: cannot be written: No such file or directory"):
-        RerunSink(tmp_path / "none" / "run.rrd", OutputOptions(tmp_path / "none" / "run.mcap"))
+        PartialFile.claimed(tmp_path / "none" / "run.rrd")
 
 
 def test_errors_of_the_library_are_output_errors(
@@ -374,7 +375,7 @@ def test_errors_of_the_library_are_output_errors(
     def fail(_self: RrdStream, _stamp_ns: int) -> None:
         raise RuntimeError("it broke")
 
-    sink = RerunSink(tmp_path / "run.rrd", OutputOptions(tmp_path / "run.mcap"))
+    sink = RerunSink(PartialFile.claimed(tmp_path / "run.rrd"), OutputOptions(tmp_path / "run.mcap"))
     sink.take(story[0])
     monkeypatch.setattr(RrdStream, "at", fail)
     with pytest.raises(OutputError, match=r"run\.rrd: cannot be written: it broke"):
@@ -388,29 +389,31 @@ def test_a_full_disk_ends_the_run_and_does_not_hang(tmp_path: Path) -> None:
         import resource, signal, sys, uuid
         from pathlib import Path
         import numpy as np, rerun as rr
-        from replay.sinks import rerun_stream
+        from replay.sinks.partial_file import PartialFile
+        from replay.sinks.rerun_stream import RrdStream
 
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
-        rerun_stream._PATIENCE_S = 0.3
-        path = Path(sys.argv[1])
-        stream = rerun_stream.RrdStream(path, uuid.UUID(int=7))
+        file = PartialFile.claimed(Path(sys.argv[1]))
+        stream = RrdStream(file, uuid.UUID(int=7))
         stream.at(1)
         noise = np.random.default_rng(1).integers(0, 255, (300, 300, 3), np.uint8)
         for name in "abc":
             stream.log([name], rr.Image(noise))
         try:
             stream.finish()
-        except RuntimeError as error:
+        except OSError as error:
             print("refused:", error)
         stream.close()
+        file.discard()
     """)
     done = subprocess.run(
         [sys.executable, "-c", script, tmp_path / "run.rrd"], capture_output=True, text=True, timeout=60
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("refused: ")
-    assert "is the disk full?" in done.stdout
+    assert "File too large" in done.stdout
+    assert not list(tmp_path.iterdir())
 
 
 # Where maps are shown
