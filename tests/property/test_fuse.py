@@ -167,3 +167,28 @@ def test_a_canvas_that_is_kept_up_to_date_is_what_is_fused_anew(history):
         np.testing.assert_array_equal(kept.grid.cells, anew.grid.cells)
         assert kept.grid.map_from_grid == anew.grid.map_from_grid
         assert canvas.update(layers, lattice).grid is kept.grid
+
+
+@given(layers, grids, cells, poses, st.sampled_from([0.05, 0.1, 0.2]))
+def test_what_is_unknown_is_neutral(placed, lattice, blank, pose, resolution_m):
+    """A map in which nothing is known changes no cell and no agreement."""
+    nothing = Layer(Grid(np.full_like(blank, -1), resolution_m), pose)
+    first, second = fuse(placed, lattice, CELLS), fuse([*placed, nothing], lattice, CELLS)
+    assert second.grid.same_as(first.grid)
+    assert second.agreements[:-1] == first.agreements
+    assert second.agreements[-1].overlap_m2 == 0.0
+
+
+@given(st.lists(hnp.arrays(np.int8, (5, 7), elements=values), min_size=1, max_size=5))
+def test_every_cell_is_what_more_says(arrays):
+    """On the same cells: unknown only where all are or none prevails, else on the side with the larger log odds."""
+    stack = np.stack([np.pad(array, 1) for array in arrays])
+    merged = fuse([Layer(Grid(each, 0.1), IDENTITY) for each in stack], Grid(stack[0], 0.1), CELLS).grid.cells
+    p = np.clip(stack / 100.0, 0.01, 0.99)
+    odds = np.where(stack >= 0, np.log(p / (1 - p)), 0.0)
+    occupied, free = np.maximum(odds, 0.0).sum(axis=0), -np.minimum(odds, 0.0).sum(axis=0)
+    known = (stack >= 0).any(axis=0)
+    assert (merged[~known] == -1).all()
+    clear = known & (np.abs(occupied - free) > 1e-5)
+    assert (merged[clear & (occupied > free)] >= 50).all()
+    assert ((merged[clear & (occupied < free)] >= 0) & (merged[clear & (occupied < free)] <= 50)).all()

@@ -125,6 +125,21 @@ def test_the_merged_map_is_what_is_fused_of_the_placed_maps_anew(steps):
 
 @settings(max_examples=FEWEST)
 @given(missions(3))
+def test_the_order_of_the_robots_that_are_placed_does_not_matter(steps):
+    latest = {robot: grid for step in steps for robot, grid in step.items()}
+    first, second = (Merger(order, CONFIG).step(latest, is_last=True) for order in (ROBOTS, ("r1", "r3", "r2")))
+    assert {robot: outcome.status for robot, outcome in second.robots.items()} == {
+        robot: outcome.status for robot, outcome in first.robots.items()
+    }
+    for robot, outcome in first.robots.items():
+        if outcome.merged_from_map is not None:
+            assert second.robots[robot].merged_from_map.is_close(
+                outcome.merged_from_map, distance_m=SAME_M, angle_rad=SAME_RAD, at_m=latest[robot].middle_m
+            )
+
+
+@settings(max_examples=FEWEST)
+@given(missions(3))
 def test_the_same_maps_have_the_same_results_and_leave_earlier_ones_as_they_were(steps):
     merger, kept = Merger(ROBOTS, CONFIG), []
     for step in steps:

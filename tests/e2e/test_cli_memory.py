@@ -1,0 +1,72 @@
+"""--max-memory: what would need more is refused, and says so; all else stays as it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mapmerge.grid import Grid
+from tests.bags import write_mcap, write_rosbag1
+from tests.program import Program
+from tests.runs import flat_map, in_log_order, seen, two_robots, updated
+
+
+def huge(side: int = 1500) -> Grid:
+    cells = np.zeros((side, side), np.int8)
+    cells[::40] = 100
+    return Grid(cells, 0.05)
+
+
+@pytest.mark.parametrize("write", [write_mcap, write_rosbag1])
+def test_a_map_that_needs_more_is_skipped_and_named(replay: Program, tmp_path: Path, write) -> None:
+    messages = in_log_order(two_robots(), [seen("r2", 13.0, huge())])
+    run = write(tmp_path / "run.bag", messages)
+    ran = replay.merge(run, "--max-memory", "20MB")
+    assert ran.status == 0, ran.err
+    assert ran.report["skipped"] == {"over_memory": 1}
+    assert ran.report["settings"]["max_memory_bytes"] == 20_000_000
+    assert ran.statuses == {"r1": "reference", "r2": "merged"}
+    assert "a map of 1500 × 1500 cells of 0.05 m needs about " in ran.err
+    assert "; --max-memory allows 20.0 MB" in ran.err
+    assert replay.merge(run, "--max-memory", "20MB", "--strict").status == 2
+    assert "skipped" not in replay.merge(run, "--max-memory", "2GiB", "--stop", "12").err
+
+
+def test_unknown_margins_do_not_count(replay: Program, tmp_path: Path) -> None:
+    grid = flat_map("r1")
+    padded = Grid(np.pad(grid.cells, 1500, constant_values=-1), grid.resolution_m)
+    ran = replay.merge(write_mcap(tmp_path / "run.mcap", [seen("r1", 0.0, padded)]), "--max-memory", "20MB")
+    assert ran.report["skipped"] == {}
+
+
+def test_an_update_of_a_map_that_was_not_taken_is_not_put_on_the_one_before(replay: Program, tmp_path: Path) -> None:
+    part = np.full((2, 2), 100, np.int8)
+    messages = [
+        seen("r1", 0.0),
+        seen("r1", 1.0, huge()),
+        updated("r1", 2.0, 0, 0, part),
+        seen("r1", 3.0, flat_map("r1", 7.0)),
+        updated("r1", 4.0, 0, 0, part),
+    ]
+    ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages), "--max-memory", "20MB")
+    assert ran.report["skipped"] == {"over_memory": 1, "update_before_grid": 1}
+    assert ran.robots["r1"]["updates"] == 3
+
+
+@pytest.mark.parametrize("text", ["", "2", "-1GB", "1e9", "2 XB", "nan", "GiB", "1023KiB", "٣GB", "2GB 3"])
+def test_what_is_no_size(replay: Program, tmp_path: Path, text: str) -> None:
+    ran = replay.merge(write_mcap(tmp_path / "run.mcap", [seen("r1", 0.0)]), f"--max-memory={text}")
+    assert ran.status == 2
+    assert "expected one such as 2GiB" in ran.error
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("2GiB", 2 << 30), ("500MB", 500_000_000), ("1.5 gb", 1_500_000_000), ("1048576", 1 << 20), ("2048kb", 2_048_000)],
+)
+def test_sizes(text: str, expected: int) -> None:
+    from replay.footprint import size_to_bytes
+
+    assert size_to_bytes(text) == expected
