@@ -11,6 +11,7 @@ from mcap.records import Attachment, Channel, Header, Metadata, Schema
 from replay.errors import InputError
 from replay.sinks.mcap_copy import McapCopy
 from replay.sources.boundary import translated
+from replay.sources.mcap_chunk import BadPart, chunk_content, inner_records
 from replay.sources.mcap_records import (
     CHANNEL,
     CHUNK,
@@ -98,8 +99,11 @@ class Walk:
             self._left_out.append(str(error))
 
     def _chunk(self, chunk: Record, copy: McapCopy) -> None:
-        content = self._records.chunk(chunk.start)
-        for record in self._records.inner_records(content, chunk.start):
+        try:
+            content, _ = chunk_content(self._records, chunk.start)
+        except BadPart as error:
+            raise InputError(f"{self._records.path}: the chunk at byte {chunk.start} is damaged: {error.detail}") from error
+        for record in inner_records(content):
             if record.opcode == MESSAGE:
                 self._message(content, record.start, copy)
             elif record.opcode in {SCHEMA, CHANNEL}:

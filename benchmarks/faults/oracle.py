@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from benchmarks.faults.runner import Ran, Used
+from replay.plain_text import plain
 
 
 class Verdict(StrEnum):
@@ -82,8 +83,8 @@ def judge(ran: Ran, expected: Expected) -> Judged:
 
 
 def _judge_error(ran: Ran, expected: Expected) -> Judged:
-    line = ran.error
-    if len(line.splitlines()) != 1 or not line.isprintable():
+    line = plain(ran.error)
+    if not ran.error.strip() or len(ran.error.splitlines()) != 1:
         return Judged(Verdict.WRONG, f"the error is not one line of text: {line!r}")
     # What is about robots names them: the recording can be read, and it is they that do not fit.
     if expected.main not in line and not (ran.is_usage and any(name in line for name in expected.robots)):

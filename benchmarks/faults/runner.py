@@ -22,6 +22,7 @@ from replay.arrivals import Feed
 from replay.errors import ReplayError, UsageError
 from replay.events import Merged, Skipped
 from replay.options import RunOptions
+from replay.plain_text import plain
 from replay.plan import Plan, open_plan
 from replay.runs import RunPath
 from replay.sources.base import RawMessage, Source
@@ -195,7 +196,7 @@ def _by_command_line(path: Path, expected: Ran) -> str:
     lines = told.getvalue().splitlines()
     left = sorted(each.name for each in path.parent.glob("merged_by_program*"))
     if expected.error:
-        fine = status in {2, 3} and lines[-1:] == [f"replay: error: {expected.error}"] and not left
+        fine = status in {2, 3} and lines[-1:] == [f"replay: error: {plain(expected.error)}"] and not left
         return "" if fine else f"it ended with {status}, left {left} and said {lines[-3:]}, not {expected.error}"
     if status not in {0, 1} or left != ["merged_by_program.json", "merged_by_program.mcap"]:
         return f"it ended with {status}, left {left} and said {lines[-3:]}"

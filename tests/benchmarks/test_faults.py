@@ -70,7 +70,6 @@ class TestOracle:
             (Ran(error="it cannot be read"), "does not name"),
             (Ran(error="the clocks of r1 cannot be read"), "does not name"),
             (Ran(error="run.mcap: it cannot\nbe read"), "not one line"),
-            (Ran(error="run.mcap: \x1b[31m"), "not one line"),
         ],
     )
     def test_tells_what_must_not_be(self, ran, why):
