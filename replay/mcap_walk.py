@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Iterator
 
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
@@ -19,6 +19,7 @@ from replay.sources.mcap_records import (
     MAGIC,
     MESSAGE,
     SCHEMA,
+    MessageHeader,
     Record,
     RecordFile,
     foreign_errors,
@@ -29,7 +30,16 @@ from replay.words import counted
 
 HEADER, ATTACHMENT, METADATA, DATA_END = 0x01, 0x09, 0x0C, 0x0F
 
+_HEAD_BYTES = 9
 _CRC_BYTES = 4
+
+_PARSERS: dict[int, type[Schema | Channel | Metadata | Attachment]] = {
+    SCHEMA: Schema,
+    CHANNEL: Channel,
+    METADATA: Metadata,
+    ATTACHMENT: Attachment,
+}
+_Item = Schema | Channel | Metadata | Attachment | tuple[MessageHeader, bytes]
 
 
 class Walk:
@@ -86,62 +96,67 @@ class Walk:
         return record.end
 
     def _take(self, record: Record, copy: McapCopy) -> None:
+        """Give a new file what a record says; what cannot be read is left out, what cannot be written is an error."""
         part = f"the record at byte {record.start}"
         try:
             with translated(self._records.path, foreign_errors(), part=part):
-                if record.opcode == CHUNK:
-                    self._chunk(record, copy)
-                elif record.opcode in _READERS:
-                    _READERS[record.opcode](self, self._records.content(record), copy)
-                elif record.opcode == MESSAGE:
-                    self._message(self._records.record_bytes(record.start), 0, copy)
+                items = list(self._items(record))
         except InputError as error:
             self._left_out.append(str(error))
+            return
+        for item in items:
+            self._give(item, copy)
 
-    def _chunk(self, chunk: Record, copy: McapCopy) -> None:
+    def _items(self, record: Record) -> Iterator[_Item]:
+        """Yield what a record says: of a chunk, all the records in it."""
+        if record.opcode == CHUNK:
+            chunk = self._chunk(record.start)
+            for inner in inner_records(chunk):
+                if inner.opcode in {SCHEMA, CHANNEL, MESSAGE}:
+                    yield self._item(chunk[inner.start : inner.end], inner.opcode)
+        elif record.opcode == MESSAGE or record.opcode in _PARSERS:
+            yield self._item(self._records.record_bytes(record.start), record.opcode)
+
+    def _chunk(self, start: int) -> bytes:
         try:
-            content, _ = chunk_content(self._records, chunk.start)
+            return chunk_content(self._records, start)[0]
         except BadPart as error:
-            raise InputError(f"{self._records.path}: the chunk at byte {chunk.start} is damaged: {error.detail}") from error
-        for record in inner_records(content):
-            if record.opcode == MESSAGE:
-                self._message(content, record.start, copy)
-            elif record.opcode in {SCHEMA, CHANNEL}:
-                _READERS[record.opcode](self, content[record.content : record.end], copy)
+            raise InputError(f"{self._records.path}: the chunk at byte {start} is damaged: {error.detail}") from error
 
-    def _message(self, container: bytes, start: int, copy: McapCopy) -> None:
-        found = message_at(container, start)
-        if found is None:
-            raise InputError(f"{self._records.path}: a message at byte {start} of its chunk is too short to be one")
-        header, data = found
+    def _item(self, record: bytes, opcode: int) -> _Item:
+        if opcode == MESSAGE:
+            message = message_at(record, 0)
+            if message is None:
+                raise InputError(f"{self._records.path}: a message of {len(record)} bytes is too short to be one")
+            return message
+        content = record[_HEAD_BYTES:]
+        if opcode == ATTACHMENT:
+            self._check_attachment(content)
+        item: _Item = _PARSERS[opcode].read(parser_stream(content))
+        return item
+
+    def _check_attachment(self, content: bytes) -> None:
+        checksum = int.from_bytes(content[-_CRC_BYTES:], "little")
+        if checksum not in {0, zlib.crc32(content[:-_CRC_BYTES])}:
+            raise InputError(f"{self._records.path}: the checksum (CRC) of an attachment is wrong")
+
+    def _give(self, item: _Item, copy: McapCopy) -> None:
+        match item:
+            case Schema():
+                copy.schema(item)
+            case Channel():
+                if not copy.channel(item):
+                    self._left_out.append(f"{item.topic}: its schema, {item.schema_id}, is lost")
+            case Metadata():
+                copy.metadata(item)
+            case Attachment():
+                copy.attachment(item)
+            case (header, data):
+                self._message(header, data, copy)
+
+    def _message(self, header: MessageHeader, data: bytes, copy: McapCopy) -> None:
         if not copy.message(header, data):
             self._lost[header.channel] += 1
             return
         self.messages += 1
         self.until_ns = max(self.until_ns, header.log_time_ns)
-
-    def _schema(self, content: bytes, copy: McapCopy) -> None:
-        copy.schema(Schema.read(parser_stream(content)))
-
-    def _channel(self, content: bytes, copy: McapCopy) -> None:
-        channel = Channel.read(parser_stream(content))
-        if not copy.channel(channel):
-            self._left_out.append(f"{channel.topic}: its schema, {channel.schema_id}, is lost")
-
-    def _metadata(self, content: bytes, copy: McapCopy) -> None:
-        copy.metadata(Metadata.read(parser_stream(content)))
-
-    def _attachment(self, content: bytes, copy: McapCopy) -> None:
-        attachment = Attachment.read(parser_stream(content))
-        checksum = int.from_bytes(content[-_CRC_BYTES:], "little")
-        if checksum not in {0, zlib.crc32(content[:-_CRC_BYTES])}:
-            raise InputError(f"{self._records.path}: the checksum (CRC) of the attachment {attachment.name} is wrong")
-        copy.attachment(attachment)
-
-
-_READERS: dict[int, Callable[[Walk, bytes, McapCopy], None]] = {
-    SCHEMA: Walk._schema,  # noqa: SLF001 - a table of this class's own
-    CHANNEL: Walk._channel,  # noqa: SLF001
-    METADATA: Walk._metadata,  # noqa: SLF001
-    ATTACHMENT: Walk._attachment,  # noqa: SLF001
-}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -38,3 +40,22 @@ def small_disk(folder: Path, size_bytes: int) -> Iterator[Path]:
         yield folder
     finally:
         subprocess.run(["umount", "--lazy", folder], check=True)
+
+
+@contextmanager
+def read_only(folder: Path) -> Iterator[None]:
+    """Let nobody change what a folder holds, not even root, whom its rights do not keep from it."""
+    if sys.platform == "win32":
+        pytest.skip("folders there take no such rights")
+    is_root = os.geteuid() == 0
+    lock, unlock = (["chattr", "+i"], ["chattr", "-i"]) if is_root else (["chmod", "a-w"], ["chmod", "u+w"])
+    try:
+        done = subprocess.run([*lock, folder], capture_output=True).returncode
+    except FileNotFoundError:
+        done = 1
+    if done:
+        pytest.skip("this file system keeps nothing from root")
+    try:
+        yield
+    finally:
+        subprocess.run([*unlock, folder], check=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import threading
 from pathlib import Path
 
 import pytest
@@ -121,6 +122,25 @@ def test_a_bug_ends_with_a_status_and_a_word(replay: Program, two: Path, monkeyp
     assert "ZeroDivisionError" in ran.err
     assert f"a bug in replay {__version__}" in ran.err.splitlines()[-1]
     assert not list(replay.folder.iterdir())
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize(
+    "where", ["replay.sinks.mcap_file.McapSink._tick", "replay.timeline.assemble", "replay.sinks.json_file.report_text"]
+)
+def test_a_bug_in_any_thread(
+    replay: Program, two: Path, monkeypatch: pytest.MonkeyPatch, where: str, jobs: int
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("as a bug would")
+
+    monkeypatch.setattr(where, broken)
+    ran = replay("merge", two, "-o", "out.mcap", "--jobs", jobs)
+    assert ran.status == 3
+    assert "ZeroDivisionError: as a bug would" in ran.err
+    assert "please report it" in ran.err.splitlines()[-1]
+    assert not list(replay.folder.iterdir())
+    assert not {each.name for each in threading.enumerate()} & {"reader", "writer", "rrd"}
 
 
 def test_a_recording_that_is_damaged_in_the_middle(replay: Program, tmp_path: Path) -> None:

@@ -5,12 +5,16 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from replay.events import Finished
+from replay.pipeline import drain
 from tests.bags import write_mcap, write_rosbag2
-from tests.disks import small_disk
+from tests.disks import read_only, small_disk
 from tests.program import Program
 from tests.runs import two_robots
 
@@ -151,6 +155,59 @@ class TestWhereNothingCanBeWritten:
         ran = replay("merge", two, "-o", folder / "out.mcap", "--no-rrd")
         assert ran.status == 3
         assert f"{folder}/out.mcap: cannot be written" in ran.error
+
+    def test_a_folder_that_becomes_read_only(
+        self, replay: Program, two: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        out = tmp_path / "out"
+        out.mkdir()
+        (out / "out.json").write_text("of an earlier run")
+        with ExitStack() as stack:
+
+            def drained(*arguments: Any) -> Finished:
+                found = drain(*arguments)
+                stack.enter_context(read_only(out))
+                return found
+
+            monkeypatch.setattr("replay.pipeline.drain", drained)
+            ran = replay("merge", two, "-o", out / "out.mcap", "--force", "--images", "none")
+            assert ran.status == 3
+            assert "cannot be written: " in ran.err.splitlines()[-1]
+            assert not {"out.mcap", "out.rrd"} & set(names(out))
+            assert (out / "out.json").read_text() == "of an earlier run"
+
+    def test_a_folder_that_vanishes(
+        self, replay: Program, two: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        out = tmp_path / "out"
+        out.mkdir()
+
+        def drained(*arguments: Any) -> Finished:
+            found = drain(*arguments)
+            out.rename(tmp_path / "elsewhere")
+            return found
+
+        monkeypatch.setattr("replay.pipeline.drain", drained)
+        ran = replay("merge", two, "-o", out / "out.mcap", "--no-rrd", "--images", "none")
+        assert ran.status == 3
+        assert "cannot be written: " in ran.err.splitlines()[-1]
+        assert names(tmp_path) == ["elsewhere"]
+        assert names(tmp_path / "elsewhere") == ["out.json.partial", "out.mcap.partial"]
+
+    def test_what_appears_during_the_run_is_not_replaced(
+        self, replay: Program, two: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def drained(*arguments: Any) -> Finished:
+            found = drain(*arguments)
+            (tmp_path / "out.json").write_text("dear to somebody")
+            return found
+
+        monkeypatch.setattr("replay.pipeline.drain", drained)
+        ran = replay("merge", two, "-o", "out.mcap", "--no-rrd", "--images", "none")
+        assert ran.status == 2
+        assert "there is already out.json" in ran.err.splitlines()[-1]
+        assert (tmp_path / "out.json").read_text() == "dear to somebody"
+        assert names(tmp_path) == ["out.json"]
 
     @pytest.mark.parametrize("name", ["out.mcap", "out.json", "out.mcap.partial", "out.json.partial"])
     def test_a_folder_in_the_way(self, replay: Program, two: Path, tmp_path: Path, name: str) -> None:

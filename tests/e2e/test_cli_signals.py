@@ -8,13 +8,17 @@ from pathlib import Path
 
 import pytest
 
+from replay.sinks.partial_file import PartialFile
 from tests.bags import write_mcap
-from tests.program import PROGRAM, quiet, started, wait_for
+from tests.program import PROGRAM, Program, quiet, started, wait_for
 from tests.runs import flat_map, seen
 
 # A shell shows 130 for both. Python ends itself with the signal, whatever the program returns, if it was running code
 # that is made at run time, such as a dataclass.
 INTERRUPTED = (130, -signal.SIGINT)
+
+
+NUMBERS = [signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
 
 
 @pytest.fixture(scope="module")
@@ -26,9 +30,10 @@ def long_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_mcap(tmp_path_factory.mktemp("long") / "long.mcap", messages)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interrupted(long_run: Path, tmp_path: Path, number: signal.Signals) -> None:
-    process = started("merge", long_run, "-o", "out.mcap", "--no-rrd", cwd=tmp_path)
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("number", NUMBERS)
+def test_interrupted(long_run: Path, tmp_path: Path, number: signal.Signals, jobs: int) -> None:
+    process = started("merge", long_run, "-o", "out.mcap", "--no-rrd", "--jobs", jobs, cwd=tmp_path)
     wait_for(tmp_path / "out.mcap.partial", process)
     process.send_signal(number)
     out, err = process.communicate(timeout=30)
@@ -51,6 +56,71 @@ def test_interrupted_leaves_what_was_there(long_run: Path, tmp_path: Path) -> No
         "out.mcap": "of an earlier run",
         "out.json": "of an earlier run",
     }
+
+
+def test_what_is_ignored_stays_ignored(two: Path, tmp_path: Path) -> None:
+    """As under nohup."""
+    process = subprocess.Popen(
+        ["nohup", *PROGRAM, "merge", two, "-o", "out.mcap", "--no-rrd"],
+        cwd=tmp_path,
+        env=quiet(),
+        text=True,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    wait_for(tmp_path / "out.mcap.partial", process)
+    process.send_signal(signal.SIGHUP)
+    process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert (tmp_path / "out.json").exists()
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_while_final_names_are_given_all_are(
+    replay: Program, two: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    """What takes no time is not left half done."""
+    rename = PartialFile.publish
+
+    def interrupted(self: PartialFile) -> None:
+        rename(self)
+        signal.raise_signal(number)
+
+    monkeypatch.setattr(PartialFile, "publish", interrupted)
+    assert replay.merge(two).status == 0
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["out.json", "out.mcap"]
+
+
+def test_interrupted_when_all_is_written_says_so(replay: Program, two: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("replay.sinks.terminal.print_table", interrupted)
+    ran = replay.merge(two)
+    assert ran.status == 130
+    assert ran.err.splitlines()[-1] == "replay: interrupted; the outputs are written"
+    assert ran.mcap.exists()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+@pytest.mark.parametrize("command", ["merge", "info"])
+def test_output_that_cannot_be_printed(two: Path, tmp_path: Path, command: str) -> None:
+    arguments = ["--no-rrd", "--images", "none", "--json"] if command == "merge" else []
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [*PROGRAM, command, two, *arguments],
+            cwd=tmp_path,
+            env=quiet(),
+            text=True,
+            stdout=full,
+            stderr=subprocess.PIPE,
+        )
+    assert done.returncode == 3
+    assert done.stderr.splitlines()[-1] == (
+        "replay: error: standard output: cannot be written: No space left on device"
+    )
+    assert len(list(tmp_path.iterdir())) == (2 if command == "merge" else 0)
 
 
 @pytest.mark.parametrize("command", ["merge", "info"])

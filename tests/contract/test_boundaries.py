@@ -1,0 +1,222 @@
+"""What the libraries below raise leaves as an error of ours, in one line; whatever else is raised is a bug."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from replay.codec import decode
+from replay.errors import InputError, OutputError, ReplayError
+from replay.options import OutputOptions
+from replay.recover import recover
+from replay.sinks import open_sinks
+from replay.sources import open_source, zstd
+from replay.sources.base import GRID_TYPE
+from tests import bags
+from tests.scenarios import events_of
+
+MODULES = {
+    "mcap": ("mcap.exceptions",),
+    "mcap checksums": ("mcap.stream_reader",),
+    "zstandard": ("zstandard",),
+    "zstd": (zstd.zstd.__name__,),
+    "rosbags": ("rosbags.rosbag1",),
+    "rosbags messages": ("rosbags.serde",),
+    "sqlite3": ("sqlite3",),
+    "opencv": ("cv2",),
+    "yaml": tuple(
+        f"ruamel.yaml.{name}" for name in ("error", "scanner", "parser", "reader", "composer", "constructor")
+    ),
+    "arrow": ("pyarrow",),
+}
+
+# Of sides that are not used, of misuse that would be a bug of ours, or no errors.
+NOT_OURS = {"Warning", "WriterError", "DecoderNotFoundError", "YAMLStreamError", "ArrowCancelled"}
+
+SYSTEM: tuple[Exception, ...] = (OSError(28, "No space left on device"), OSError("it broke"), MemoryError())
+# lz4 has no class of its own.
+LZ4: tuple[Exception, ...] = (RuntimeError("LZ4F_decompress failed with code: ERROR"),)
+
+
+class PanicException(BaseException):
+    """What Rust raises in Python: it cannot be imported, and is no `Exception`."""
+
+
+PanicException.__module__ = "pyo3_runtime"
+
+
+def raised_by(library: str) -> list[BaseException]:
+    """Return one error of each class that a library has."""
+    classes = {
+        found
+        for name in MODULES[library]
+        for found in vars(import_module(name)).values()
+        if inspect.isclass(found)
+        and issubclass(found, Exception)
+        and not issubclass(found, Warning)
+        and found.__module__ != "builtins"
+        and found.__name__ not in NOT_OURS
+    }
+    assert classes
+    return [_instance(each) for each in sorted(classes, key=lambda each: each.__qualname__)]
+
+
+def _instance(kind: type[Exception]) -> Exception:
+    """Return an error of a class, whatever it is made of."""
+    for arguments in ((), ("it broke\nin two lines",), (1, 2, 3), (1, 2, 3, 4), ("a", 1, 2, "b", "c")):
+        try:
+            error = kind(*arguments)
+            str(error)
+        except (TypeError, AttributeError):
+            continue
+        return error
+    raise AssertionError(f"{kind} is made of something else")
+
+
+Prepare = Callable[[Path], Callable[[], object]]
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """Where a library is called.
+
+    Parameters
+    ----------
+    entry
+        What is replaced by something that raises.
+    prepare
+        Writes what is to be read, and returns what then calls the entry.
+    """
+
+    entry: str
+    prepare: Prepare
+    libraries: tuple[str, ...]
+    more: tuple[BaseException, ...] = SYSTEM
+    expected: type[ReplayError] = InputError
+
+
+def _reading(write: Callable[..., Path], name: str, *arguments: Any, **options: Any) -> Prepare:
+    def prepare(folder: Path) -> Callable[[], object]:
+        return partial(_read, write(folder / name, *arguments, **options))
+
+    return prepare
+
+
+def _read(path: Path) -> None:
+    with open_source(path) as source:
+        for raw in source.messages([each.name for each in source.info.topics if each.msgtype == GRID_TYPE]):
+            decode(raw)
+
+
+def _writing(folder: Path) -> Callable[[], object]:
+    events = events_of("merged")
+
+    def write() -> None:
+        with open_sinks(OutputOptions(folder / "out.mcap")) as sinks:
+            for event in events:
+                for sink in sinks:
+                    sink.take(event)
+
+    return write
+
+
+def _recovering(folder: Path) -> Callable[[], object]:
+    return partial(recover, bags.write_mcap(folder / "run.mcap"), folder / "out.mcap")
+
+
+PIXELS = np.zeros((4, 5), np.uint8)
+ZSTD = zstd.zstd.__name__
+TYPESTORE = "rosbags.typesys.store.Typestore"
+RERUN = (*SYSTEM, RuntimeError(), PanicException("!"))
+OPEN_BAG, OPEN_FOLDER = (bags.write_rosbag1, "run.bag"), (bags.write_rosbag2, "run")
+BOUNDARIES = {
+    "bag, opened": Boundary("rosbags.rosbag1.Reader.open", _reading(*OPEN_BAG), ("rosbags",)),
+    "bag, a chunk": Boundary(
+        "rosbags.rosbag1.reader.Header.get_uint32", _reading(*OPEN_BAG), ("rosbags",), (*SYSTEM, *LZ4)
+    ),
+    "mcap, a record": Boundary(
+        "mcap.records.Chunk.read", _reading(bags.write_mcap, "run.mcap"), ("mcap", "mcap checksums")
+    ),
+    "mcap, a zstd chunk": Boundary(
+        "mcap.stream_reader.get_chunk_data_stream",
+        _reading(bags.write_mcap, "run.mcap"),
+        ("zstandard", "mcap", "mcap checksums"),
+    ),
+    "mcap, an lz4 chunk": Boundary(
+        "lz4.frame.decompress", _reading(bags.write_mcap, "run.mcap", compression="lz4"), (), (*SYSTEM, *LZ4)
+    ),
+    "db3, opened": Boundary("sqlite3.connect", _reading(bags.write_bare_db3, "run.db3"), ("sqlite3",)),
+    "db3, a message": Boundary(
+        f"{ZSTD}.decompress", _reading(bags.write_bare_db3, "run.db3", compression="message"), ("zstd",)
+    ),
+    "folder, its metadata": Boundary("ruamel.yaml.YAML.load", _reading(*OPEN_FOLDER), ("yaml",)),
+    "folder, a part": Boundary(f"{ZSTD}.open", _reading(*OPEN_FOLDER, compression="file"), ("zstd",)),
+    "saved map, its description": Boundary(
+        "ruamel.yaml.YAML.load", _reading(bags.write_saved_map, "map.yaml", PIXELS), ("yaml",)
+    ),
+    "saved map, its image": Boundary("cv2.imdecode", _reading(bags.write_saved_map, "map.yaml", PIXELS), ("opencv",)),
+    "a message": Boundary(
+        f"{TYPESTORE}.deserialize_cdr", _reading(bags.write_mcap, "run.mcap"), ("rosbags messages",), ()
+    ),
+    "out.mcap, a message": Boundary(
+        "mcap.writer.Writer.add_message", _writing, ("mcap", "zstandard"), expected=OutputError
+    ),
+    "out.mcap, its end": Boundary("mcap.writer.Writer.finish", _writing, ("mcap", "zstandard"), expected=OutputError),
+    "out.rrd, opened": Boundary("rerun.RecordingStream.save", _writing, ("arrow",), RERUN, OutputError),
+    "out.rrd, a row": Boundary("rerun.RecordingStream.log", _writing, ("arrow",), RERUN, OutputError),
+    "out.rrd, its end": Boundary("rerun.chunk.RrdReader.store", _writing, ("arrow",), RERUN, OutputError),
+    "recovered, a message": Boundary(
+        "mcap.writer.Writer.add_message", _recovering, ("mcap", "zstandard"), expected=OutputError
+    ),
+    "recovered, its end": Boundary(
+        "mcap.writer.Writer.finish", _recovering, ("mcap", "zstandard"), expected=OutputError
+    ),
+}
+
+CASES = [
+    pytest.param(boundary, error, id=f"{name}-{type(error).__name__}-{index}")
+    for name, boundary in BOUNDARIES.items()
+    for index, error in enumerate([*boundary.more, *(each for name in boundary.libraries for each in raised_by(name))])
+]
+
+
+def raising(error: BaseException) -> Callable[..., object]:
+    def fail(*_: object, **__: object) -> object:
+        raise error
+
+    return fail
+
+
+@pytest.mark.parametrize(("boundary", "error"), CASES)
+def test_is_an_error_of_ours_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, boundary: Boundary, error: BaseException
+) -> None:
+    call = boundary.prepare(tmp_path)
+    monkeypatch.setattr(boundary.entry, raising(error))
+    with pytest.raises(boundary.expected) as caught:
+        call()
+    assert str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert caught.value.__cause__ is not None
+    assert not [each.name for each in tmp_path.iterdir() if each.name.startswith("out.")]
+
+
+@pytest.mark.parametrize("name", BOUNDARIES)
+def test_each_entry_is_what_is_called(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str) -> None:
+    """Else the test above would pass by whatever else goes wrong: here what is raised is nobody's."""
+
+    class Unheard(BaseException):
+        pass
+
+    call = BOUNDARIES[name].prepare(tmp_path)
+    monkeypatch.setattr(BOUNDARIES[name].entry, raising(Unheard()))
+    with pytest.raises(Unheard):
+        call()
