@@ -1,49 +1,52 @@
 """SQLite files of ROS 2 bags: ``.db3``.
 
 They are read with Python's own sqlite3, because it reads one row at a time in order of time and then of writing,
-whether or not the file has its index on time, and takes any path; the reader of rosbags does neither.
+whether or not the file has its index on time, and takes any path; the reader of rosbags does neither. What SQLite
+refuses, or would read wrongly because the file ends early, is read from its pages.
 """
 
 from __future__ import annotations
 
+import errno
 import sqlite3
-import struct
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
-from shlex import quote
 
 from replay.errors import InputError
-from replay.sources.base import GRID_TYPE, UPDATE_TYPE, RawMessage, SourceInfo
+from replay.skip_cause import SkipCause
+from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE, RawMessage, SourceInfo
 from replay.sources.boundary import COMMON, Closing, translated
-from replay.sources.losses import Losses
-from replay.sources.topics import topic_table, type_in
+from replay.sources.definitions import differing_field
+from replay.sources.losses import Loss, Losses
+from replay.sources.sqlite3_beside import JOURNAL, WAL, beside, check_applied, check_journal, check_wal, copied
+from replay.sources.sqlite3_rows import BadRowError, BagTables, NoBagError, Record, Row, SalvagedTables, SqliteTables
+from replay.sources.sqlite3_salvage import read_header
+from replay.sources.topics import normalised_type, topic_table, type_in
 from replay.sources.zstd import ZstdError, decompressed_cdr
 
 _MAGIC = b"SQLite format 3\0"
 _FOREIGN = (*COMMON, sqlite3.Error, ZstdError)
-
-_TABLES = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('topics', 'messages')"
-_TOPICS = """
-    SELECT topics.id, name, type, serialization_format, count(messages.topic_id)
-    FROM topics LEFT JOIN messages ON topics.id = messages.topic_id GROUP BY topics.id
-"""
-_TIMES = "SELECT min(timestamp), max(timestamp) FROM messages"
-_ROWS = "SELECT id, topic_id, timestamp FROM messages WHERE topic_id IN ({}) ORDER BY timestamp, id"
-_DATA = "SELECT data FROM messages WHERE id = ?"
+_DECODED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 
 
 @dataclass(frozen=True, slots=True)
 class _Topic:
+    """A topic; ``problem`` says why its messages cannot be used, whatever they hold."""
+
     name: str
     msgtype: str
     encoding: str
     count: int
+    problem: str = ""
 
 
 class Sqlite3File(Closing):
     """A SQLite file of a ROS 2 bag, with or without the folder that it belongs to.
+
+    Rows that a recorder left in a ``-wal`` beside it are read, and a change that it left unfinished is undone, in a
+    temporary copy. Damage is left out and named.
 
     Parameters
     ----------
@@ -55,18 +58,10 @@ class Sqlite3File(Closing):
         self.path = copy_of or path
         self.losses = Losses()
         with ExitStack() as stack, translated(self.path, _FOREIGN):
-            _check_whole(path.resolve(), self.path)
-            # Immutable, so that not even a lock file is left beside the recording.
-            uri = f"{path.resolve().as_uri()}?mode=ro&immutable=1"
-            # opened in one thread and read in another, but never in two at once
-            self._database = stack.enter_context(closing(sqlite3.connect(uri, uri=True, check_same_thread=False)))
-            if self._database.execute(_TABLES).fetchone() != (2,):
-                raise InputError(
-                    f"{self.path}: this SQLite file is no ROS 2 bag: 'topics' and 'messages' were expected"
-                )
-            self._topics = {key: _Topic(*row) for key, *row in self._database.execute(_TOPICS)}
-            self._check_encodings(each for each in self._topics.values() if each.msgtype in {GRID_TYPE, UPDATE_TYPE})
-            self._start_ns, self._stop_ns = self._database.execute(_TIMES).fetchone()
+            self._plain = path.resolve()
+            self._tables = self._open_tables(stack)
+            self._topics = self._read_topics()
+            self._times_ns = self._tables.times_ns()
             self._resources = stack.pop_all()
 
     @classmethod
@@ -78,48 +73,170 @@ class Sqlite3File(Closing):
     @property
     def info(self) -> SourceInfo:
         """What the file holds."""
-        rows = ((each.name, type_in(each.encoding, each.msgtype), each.count) for each in self._topics.values())
-        return SourceInfo("sqlite3", self._start_ns, self._stop_ns, topic_table(rows))
+        rows = ((each.name, each.msgtype, each.count) for each in self._topics.values())
+        start_ns, stop_ns = self._times_ns or (None, None)
+        return SourceInfo("sqlite3", start_ns, stop_ns, topic_table(rows))
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """Yield the messages of these topics in order of log time, ties in the order in which they were written."""
         with translated(self.path, _FOREIGN):
-            wanted = {key: topic for key, topic in self._topics.items() if topic.name in topics}
+            wanted = {key: topic for key, topic in self._topics.items() if topic.name in topics and not topic.problem}
             self._check_encodings(wanted.values())
-            rows = self._database.execute(_ROWS.format(", ".join("?" * len(wanted))), list(wanted))
-            for key, topic_id, log_time_ns in rows:
-                topic = wanted[topic_id]
-                (data,) = self._database.execute(_DATA, (key,)).fetchone()
-                yield RawMessage(topic.name, topic.msgtype, "cdr", log_time_ns, decompressed_cdr(data))
+            met = dict.fromkeys(wanted, 0)
+            for row in self._rows(wanted):
+                met[row.topic_id] += 1
+                topic = wanted[row.topic_id]
+                data = self._data(row, topic)
+                if data is not None:
+                    yield RawMessage(topic.name, topic.msgtype, "cdr", row.log_time_ns, data)
+            for key, topic in wanted.items():
+                if met[key] < topic.count and isinstance(self._tables, SqliteTables):
+                    detail = f"the index on time lists {met[key]} of its {topic.count} messages"
+                    self.losses.add(
+                        Loss(SkipCause.DAMAGED, f"topic {topic.name}", detail, topic.count - met[key], topic.name)
+                    )
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file, and remove its copy."""
         self._resources.close()
+
+    def _open_tables(self, stack: ExitStack) -> BagTables:
+        """Return the tables: as SQLite reads them if it can, else as far as they are there."""
+        found = beside(self._plain)
+        wal = check_wal(self._plain, found[WAL], self.path, self.losses) if WAL in found else None
+        if JOURNAL in found:
+            check_journal(self._plain, found[JOURNAL], self.path, self.losses)
+        if found:
+            self._plain = copied(self._plain, found, stack)
+        elif self._is_short():
+            return self._salvaged(stack)
+        try:
+            database = stack.enter_context(closing(_connected(self._plain, is_copy=bool(found))))
+            if wal is not None:
+                check_applied(database, wal, self.path, self.losses)
+            tables = SqliteTables(database)
+            # all that is read of them but the data of messages
+            tables.counts(), tables.times_ns(), tables.topics(), tables.definitions()
+        except NoBagError as error:
+            raise InputError(f"{self.path}: this SQLite file is no ROS 2 bag: {error}") from error
+        except sqlite3.DatabaseError as error:
+            _raise_unless_damaged(error)
+            return self._salvaged(stack)
+        return tables
+
+    def _is_short(self) -> bool:
+        """Tell whether the file has fewer pages than its header says, which SQLite would not mention."""
+        with self._plain.open("rb") as file:
+            header = read_header(file)
+        return header is None or self._plain.stat().st_size < (header.pages or 0) * header.page_bytes
+
+    def _salvaged(self, stack: ExitStack) -> SalvagedTables:
+        file = stack.enter_context(self._plain.open("rb"))
+        header, size = read_header(file), self._plain.stat().st_size
+        try:
+            if header is None:
+                raise NoBagError("its first page is damaged or cut off")
+            return SalvagedTables(file, size, header, self.losses)
+        except NoBagError as error:
+            raise InputError(
+                f"{self.path}: none of this SQLite file of {size} bytes can be read: {error}; "
+                "copy it again from where it was made"
+            ) from error
+
+    def _read_topics(self) -> dict[int, _Topic]:
+        """Return the topics by id, and name those whose messages cannot be used."""
+        counts = self._tables.counts()
+        definitions: dict[str, list[Record]] = {}
+        for each in self._tables.definitions():
+            definitions.setdefault(_text(each, "topic_type"), []).append(each)
+        topics = {}
+        for row in self._tables.topics():
+            key = row.get("id")
+            if isinstance(key, int):
+                topic = _topic(row, counts.get(key, 0), definitions.get(_text(row, "type"), []))
+                topics[key] = topic
+                if topic.problem:
+                    place = f"topic {topic.name}"
+                    self.losses.add(Loss(SkipCause.UNKNOWN_TYPE, place, topic.problem, topic.count, topic.name))
+        for key, count in counts.items():
+            if key not in topics:
+                detail = "the table of topics has no such topic"
+                self.losses.add(Loss(SkipCause.UNKNOWN_TYPE, f"topic {key!r}", detail, count))
+        return topics
+
+    def _rows(self, topic_ids: Collection[int]) -> Iterator[Row]:
+        """Yield where the messages of these topics are, whatever SQLite comes upon on the way."""
+        last = None
+        try:
+            for row in self._tables.rows(topic_ids):
+                last = row
+                yield row
+        except sqlite3.DatabaseError as error:
+            _raise_unless_damaged(error)
+        else:
+            return
+        self._tables = self._salvaged(self._resources)
+        yield from (row for row in self._tables.rows(topic_ids) if last is None or row > last)
+
+    def _data(self, row: Row, topic: _Topic) -> bytes | None:
+        """Return the data of a message; None, and name it, if it cannot be used."""
+        try:
+            data = self._tables.data(row)
+            if not isinstance(row.log_time_ns, int):
+                raise BadRowError(f"its time is {type(row.log_time_ns).__name__}, not a number")
+            return decompressed_cdr(data)
+        except BadRowError as error:
+            detail = f"it cannot be read: {error}"
+        except ZstdError as error:
+            detail = f"it cannot be decompressed: {' '.join(str(error).split())}"
+        self.losses.add(Loss(SkipCause.DAMAGED, f"message {row.key}", detail, 1, topic.name))
+        return None
 
     def _check_encodings(self, topics: Iterable[_Topic]) -> None:
         for topic in topics:
             if topic.encoding != "cdr":
-                raise InputError(
-                    f"{self.path}: topic {topic.name} is serialised as '{topic.encoding}'; cdr is read: "
-                    "convert the recording with `ros2 bag convert`"
-                )
+                raise InputError(f"{self.path}: topic {topic.name} {_not_read(topic.encoding)}")
 
 
-def _check_whole(path: Path, shown: Path) -> None:
-    """Refuse a database that is not all in its file, because SQLite would leave out rows without a word."""
-    for suffix, content in (("-wal", "messages that are not in the file"), ("-journal", "an unfinished change")):
-        beside = path.with_name(path.name + suffix)
-        if beside.is_file() and beside.stat().st_size > 0:
-            raise InputError(
-                f"{shown}: the recording was not closed: {beside.name} beside it holds {content} and would be lost; "
-                f"complete the file first: sqlite3 {quote(str(path))} 'PRAGMA wal_checkpoint(TRUNCATE)'"
-            )
-    with path.open("rb") as file:
-        head = file.read(100)
-    (page_size,) = struct.unpack_from(">H", head, 16)
-    changed, page_count = struct.unpack_from(">II", head, 24)
-    (valid_for,) = struct.unpack_from(">I", head, 92)
-    # The header stores 65536 as 1, and says at which change its count of pages was right.
-    size, expected = path.stat().st_size, (65536 if page_size == 1 else page_size) * page_count
-    if changed == valid_for and size < expected:
-        raise InputError(f"{shown}: the file ends early at byte {size}: it should have {expected} bytes; copy it again")
+def _connected(path: Path, *, is_copy: bool) -> sqlite3.Connection:
+    # Immutable, so that not even a lock file is left beside the recording.
+    uri = f"{path.as_uri()}?mode={'rw' if is_copy else 'ro&immutable=1'}"
+    # opened in one thread and read in another, but never in two at once
+    return sqlite3.connect(uri, uri=True, check_same_thread=False)
+
+
+def _raise_unless_damaged(error: sqlite3.DatabaseError) -> None:
+    """Raise an error again that says nothing about the file."""
+    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
+    if code == sqlite3.SQLITE_FULL:
+        raise OSError(errno.ENOSPC, "No space left on device") from error
+    if code not in {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}:
+        raise error
+
+
+def _topic(row: Record, count: int, definitions: Sequence[Record]) -> _Topic:
+    name, encoding = _text(row, "name"), _text(row, "serialization_format")
+    msgtype = type_in(encoding, _text(row, "type"))
+    plain = normalised_type(_text(row, "type"))
+    if plain not in _DECODED_TYPES:
+        return _Topic(name, msgtype, encoding, count)
+    if encoding != "cdr":
+        return _Topic(name, msgtype, encoding, count, f"it {_not_read(encoding)}")
+    for each in definitions:
+        # There may be one for each of several variants of a type.
+        is_own = _text(each, "type_description_hash") in {"", _text(row, "type_description_hash")}
+        text = _text(each, "encoded_message_definition")
+        difference = differing_field(plain, text, 2) if is_own else None
+        if difference is not None:
+            return _Topic(name, f"{msgtype} (another definition)", encoding, count, difference)
+    return _Topic(name, msgtype, encoding, count)
+
+
+def _not_read(encoding: str) -> str:
+    return f"is serialised as '{encoding}'; cdr is read: convert the recording with `ros2 bag convert`"
+
+
+def _text(record: Record, column: str) -> str:
+    """Return a value that should be text; "" if it is not."""
+    value = record.get(column)
+    return value if isinstance(value, str) else ""

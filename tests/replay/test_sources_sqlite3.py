@@ -1,57 +1,225 @@
 from __future__ import annotations
 
+import errno
+import hashlib
 import shutil
 import sqlite3
+import tempfile
+from collections.abc import Iterable
 from contextlib import closing
 from pathlib import Path
 
+import pytest
+
+from replay.errors import InputError
 from replay.sources import open_source
+from replay.sources.base import GRID_TYPE
+from replay.sources.losses import Loss
 from tests import bags
 from tests.replay.test_sources_open import refused
 
+Message = tuple[str, int, bytes]
 
-def test_messages_left_in_a_wal_are_not_lost(tmp_path: Path) -> None:
-    whole = bags.write_bare_db3(tmp_path / "a.db3")
-    # As a recorder leaves its files when it is killed: the last message is in the -wal only.
-    with closing(sqlite3.connect(whole)) as database:
-        database.execute("PRAGMA journal_mode=WAL")
-        database.execute("INSERT INTO messages (topic_id, timestamp, data) SELECT topic_id, 1, data FROM messages")
-        database.commit()
-        crashed = tmp_path / "crashed.db3"
-        for suffix in ("", "-wal"):
-            shutil.copy(f"{whole}{suffix}", f"{crashed}{suffix}")
-    refused(crashed, "crashed.db3-wal", "PRAGMA wal_checkpoint(TRUNCATE)")
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+# --- what a recorder leaves beside its file when it is killed
+
+
+def _read(path: Path) -> tuple[list[Message], tuple[Loss, ...]]:
+    """Return all messages of a file and what is lost of it; the folder must stay as it is."""
+    before = _digests(path.parent)
+    with open_source(path) as source:
+        assert _digests(path.parent) == before
+        found = [
+            (each.topic, each.log_time_ns, bytes(each.data))
+            for each in source.messages([topic.name for topic in source.info.topics])
+        ]
+        losses = source.losses.all
+    assert _digests(path.parent) == before
+    return found, losses
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    files = sorted(each for each in folder.rglob("*") if each.is_file())
+    return {str(each): hashlib.sha256(each.read_bytes()).hexdigest() for each in files}
+
+
+def _recorded(messages: Iterable[bags.Recorded]) -> list[Message]:
+    ordered = sorted(messages, key=lambda each: each.log_time_ns)
+    return [(each.topic, each.log_time_ns, bags.as_cdr(each)) for each in ordered]
+
+
+def _killed(folder: Path, journal_mode: str, *, is_committed: bool) -> Path:
+    """Leave a file as a recorder does that is killed while it writes: one more of each message."""
+    folder.mkdir()
+    whole = bags.write_bare_db3(folder.parent / "a.db3")
+    with closing(sqlite3.connect(whole, isolation_level=None)) as database:
+        database.execute(f"PRAGMA journal_mode={journal_mode}")
+        # so that unfinished changes reach the file
+        database.execute("PRAGMA cache_size=1")
+        database.execute("BEGIN")
+        database.execute(
+            "INSERT INTO messages (topic_id, timestamp, data) SELECT topic_id, timestamp + 1, data FROM messages"
+        )
+        if is_committed:
+            database.execute("COMMIT")
+        for suffix in ("", "-wal", "-journal"):
+            if Path(f"{whole}{suffix}").exists():
+                shutil.copy(f"{whole}{suffix}", folder / f"killed.db3{suffix}")
+    return folder / "killed.db3"
+
+
+def _twice() -> list[Message]:
+    """Return what is recorded with one more of each message, whose bytes are those of the first."""
+    again = [(topic, log_time_ns + 1, data) for topic, log_time_ns, data in _recorded(bags.SAMPLE)]
+    return sorted([*_recorded(bags.SAMPLE), *again], key=lambda each: each[1])
+
+
+def test_messages_left_in_a_wal_are_read(tmp_path: Path, temporary: Path) -> None:
+    path = _killed(tmp_path / "killed", "WAL", is_committed=True)
+    assert path.with_name("killed.db3-wal").stat().st_size > 0
+    found, losses = _read(path)
+    assert found == _twice()
+    assert losses == ()
+    assert list(temporary.iterdir()) == []
+
+
+def test_an_unfinished_change_in_a_wal_was_never_there(tmp_path: Path) -> None:
+    path = _killed(tmp_path / "killed", "WAL", is_committed=False)
+    assert path.with_name("killed.db3-wal").stat().st_size > 0
+    assert _read(path) == (_recorded(bags.SAMPLE), ())
+
+
+def test_an_unfinished_change_in_the_file_is_undone(tmp_path: Path, temporary: Path) -> None:
+    path = _killed(tmp_path / "killed", "DELETE", is_committed=False)
+    assert path.with_name("killed.db3-journal").stat().st_size > 0
+    # without the journal there is more, or less that can be read
+    found, losses = _read(path)
+    assert (found, losses) == (_recorded(bags.SAMPLE), ())
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_journal_that_cannot_be_applied_is_named(tmp_path: Path) -> None:
+    path = bags.write_bare_db3(tmp_path / "a.db3")
+    (tmp_path / "a.db3-journal").write_bytes(b"something else")
+    found, losses = _read(path)
+    assert found == _recorded(bags.SAMPLE)
+    assert [(each.cause, each.place) for each in losses] == [("damaged", "a.db3-journal")]
+
+
+def test_a_journal_that_was_ended_by_erasing_its_beginning(tmp_path: Path) -> None:
+    path = bags.write_bare_db3(tmp_path / "a.db3")
+    (tmp_path / "a.db3-journal").write_bytes(bytes(600))
+    assert _read(path) == (_recorded(bags.SAMPLE), ())
+
+
+def test_a_damaged_wal_is_used_up_to_the_damage(tmp_path: Path) -> None:
+    path = _killed(tmp_path / "killed", "WAL", is_committed=True)
+    wal = path.with_name("killed.db3-wal")
+    data = bytearray(wal.read_bytes())
+    data[len(data) // 2] ^= 1
+    wal.write_bytes(data)
+    found, losses = _read(path)
+    assert found == _recorded(bags.SAMPLE)
+    assert [(each.cause, each.place) for each in losses] == [("wrong_checksum", "killed.db3-wal")]
+
+
+def test_a_wal_that_ends_early(tmp_path: Path) -> None:
+    path = _killed(tmp_path / "killed", "WAL", is_committed=True)
+    wal = path.with_name("killed.db3-wal")
+    wal.write_bytes(wal.read_bytes()[:-100])
+    found, losses = _read(path)
+    assert found == _recorded(bags.SAMPLE)
+    assert [(each.cause, each.place) for each in losses] == [("ends_early", "killed.db3-wal")]
 
 
 def test_a_wal_is_looked_for_beside_the_file_that_a_link_names(tmp_path: Path) -> None:
-    path = bags.write_bare_db3(tmp_path / "a.db3")
-    (tmp_path / "a.db3-wal").write_bytes(b"rows")
+    path = _killed(tmp_path / "killed", "WAL", is_committed=True)
     (tmp_path / "sub").mkdir()
     link = tmp_path / "sub" / "link.db3"
     link.symlink_to(path)
-    refused(link, "a.db3-wal")
+    assert _read(link) == (_twice(), ())
+
+
+def test_a_file_and_its_wal_that_both_end_early(tmp_path: Path) -> None:
+    path = _killed(tmp_path / "killed", "WAL", is_committed=True)
+    path.write_bytes(path.read_bytes()[:20_000])
+    refused(path, "ends early at byte 20000", "killed.db3-wal")
 
 
 def test_an_empty_wal_is_no_harm(tmp_path: Path) -> None:
     path = bags.write_bare_db3(tmp_path / "a.db3")
     (tmp_path / "a.db3-wal").touch()
+    assert _read(path) == (_recorded(bags.SAMPLE), ())
+
+
+def test_no_room_for_the_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = _killed(tmp_path / "killed", "WAL", is_committed=True)
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(shutil, "copyfile", full)
+    refused(path, "No space left", "TMPDIR")
+
+
+# --- topics
+
+
+def test_maps_in_another_serialisation_are_named(tmp_path: Path) -> None:
+    path = bags.write_bare_db3(tmp_path / "a.db3", serialization_format="json")
     with open_source(path) as source:
-        assert len(list(source.messages(["/r1/map"]))) == 3
-
-
-def test_another_serialisation(tmp_path: Path) -> None:
-    refused(bags.write_bare_db3(tmp_path / "a.db3", serialization_format="json"), "'json'", "cdr", "ros2 bag convert")
+        assert GRID_TYPE not in {each.msgtype for each in source.info.topics}
+        named = {each.topic: (str(each.cause), each.messages) for each in source.losses.all}
+        assert named == {
+            "/r1/map": ("unknown_type", 3),
+            "/r2/map": ("unknown_type", 3),
+            "/r1/map_updates": ("unknown_type", 1),
+        }
+        assert all("'json'; cdr is read" in each.detail for each in source.losses.all)
+        assert list(source.messages(["/r1/map"])) == []
 
 
 def test_other_topics_may_be_serialised_otherwise(tmp_path: Path) -> None:
     path = bags.write_bare_db3(tmp_path / "a.db3")
-    with closing(sqlite3.connect(path)) as database:
-        database.execute("UPDATE topics SET serialization_format = 'json' WHERE name = '/chatter'")
-        database.commit()
+    _execute(path, "UPDATE topics SET serialization_format = 'json' WHERE name = '/chatter'")
     with open_source(path) as source:
         assert len(list(source.messages(["/r1/map"]))) == 3
         assert ("/chatter", "std_msgs/msg/String (json)") in {(t.name, t.msgtype) for t in source.info.topics}
+        assert source.losses.all == ()
     refused(path, "/chatter", "'json'")
+
+
+def test_maps_with_another_definition_are_no_maps(tmp_path: Path) -> None:
+    path = bags.write_bare_db3(tmp_path / "a.db3")
+    _execute(
+        path,
+        "UPDATE message_definitions SET encoded_message_definition = "
+        "replace(encoded_message_definition, 'uint32 width', 'uint64 width') "
+        "WHERE topic_type = 'nav_msgs/msg/OccupancyGrid'",
+    )
+    with open_source(path) as source:
+        assert GRID_TYPE not in {each.msgtype for each in source.info.topics}
+        assert [(str(each.cause), each.topic, each.messages) for each in source.losses.all] == [
+            ("unknown_type", "/r1/map", 3),
+            ("unknown_type", "/r2/map", 3),
+        ]
+        assert "width" in source.losses.all[0].detail
+
+
+def test_messages_of_a_topic_that_is_not_there(tmp_path: Path) -> None:
+    path = bags.write_bare_db3(tmp_path / "a.db3")
+    _execute(path, "DELETE FROM topics WHERE name = '/r1/map'")
+    found, losses = _read(path)
+    assert found == [each for each in _recorded(bags.SAMPLE) if each[0] != "/r1/map"]
+    assert [(str(each.cause), each.messages) for each in losses] == [("unknown_type", 3)]
 
 
 def test_database_that_is_no_bag(tmp_path: Path) -> None:
@@ -62,19 +230,96 @@ def test_database_that_is_no_bag(tmp_path: Path) -> None:
     refused(path, "no ROS 2 bag", "'messages'")
 
 
-def test_truncated_says_where(tmp_path: Path) -> None:
-    path = bags.write_bare_db3(tmp_path / "a.db3")
-    data = path.read_bytes()
-    path.write_bytes(data[: len(data) // 2])
-    refused(path, f"ends early at byte {len(data) // 2}", f"{len(data)} bytes")
+def _execute(path: Path, statement: str) -> None:
+    with closing(sqlite3.connect(path)) as database:
+        database.execute(statement)
+        database.commit()
 
 
-def test_every_truncation_is_one_line(tmp_path: Path) -> None:
-    data = bags.write_bare_db3(tmp_path / "whole.db3").read_bytes()
-    for length in [*range(1, 200, 13), *range(200, len(data), 4099)]:
-        path = tmp_path / "cut.db3"
-        path.write_bytes(data[:length])
-        refused(path)
+# --- files that end early
+
+
+def _last_bytes(whole: bytes) -> dict[bytes, int]:
+    """Return where the page ends that has the last bytes of each message, told by the bytes themselves."""
+    page_bytes = int.from_bytes(whole[16:18], "big")
+    ends = {}
+    for _, _, data in _recorded(bags.SAMPLE):
+        pieces = [data[start : start + 24] for start in range(0, len(data) - 24, 200)] + [data[-24:]]
+        # of repeated text the first place would be found, whatever piece it is
+        places = [whole.index(piece) for piece in pieces if whole.count(piece) == 1]
+        ends[data] = (max(places) // page_bytes + 1) * page_bytes if places else len(whole)
+    return ends
+
+
+def test_of_a_truncated_file_every_message_is_read_whose_pages_are_there(tmp_path: Path) -> None:
+    messages = [each for each in bags.SAMPLE if each.topic != "/chatter"]
+    whole = bags.write_bare_db3(tmp_path / "a.db3", messages).read_bytes()
+    ends = {data: end for data, end in _last_bytes(whole).items() if data in {bags.as_cdr(each) for each in messages}}
+    (tmp_path / "cut").mkdir()
+    path = tmp_path / "cut" / "cut.db3"
+    counts = set()
+    for length in [*range(1, 200, 13), *range(200, len(whole), 1023), len(whole) - 1]:
+        path.write_bytes(whole[:length])
+        if not _can_be_opened(path):
+            refused(path)
+            assert not any(end <= length for end in ends.values())
+            continue
+        found, losses = _read(path)
+        assert found == [each for each in _recorded(messages) if ends[each[2]] <= length]
+        assert [(str(each.cause), each.place) for each in losses] == [("ends_early", f"byte {length}")]
+        assert losses[0].messages in {None, len(messages) - len(found)}
+        counts.add(len(found))
+    assert counts == set(range(len(messages)))
+
+
+def test_of_a_long_truncated_file_rows_are_found_though_what_points_to_their_pages_is_lost(tmp_path: Path) -> None:
+    """Pages that point to others are written late: of so many rows there are two levels of them."""
+    small = [bags.Recorded("/chatter", bags.TEXT_TYPE, bags.START + each, {"data": "x" * 700}) for each in range(4000)]
+    whole = bags.write_bare_db3(tmp_path / "a.db3", small).read_bytes()
+    (tmp_path / "cut").mkdir()
+    path = tmp_path / "cut" / "cut.db3"
+    path.write_bytes(whole[: len(whole) // 2])
+    found, losses = _read(path)
+    assert [each[1] - bags.START for each in found] == list(range(len(found)))
+    assert 1900 < len(found) < 2100
+    assert [str(each.cause) for each in losses] == ["ends_early"]
+
+
+def _can_be_opened(path: Path) -> bool:
+    try:
+        open_source(path).close()
+    except InputError:
+        return False
+    return True
+
+
+# --- damaged files
+
+
+def test_overwritten_pages_are_left_out_and_named(tmp_path: Path) -> None:
+    whole = bags.write_bare_db3(tmp_path / "whole.db3").read_bytes()
+    recorded = _recorded(bags.SAMPLE)
+    (tmp_path / "broken").mkdir()
+    path = tmp_path / "broken" / "broken.db3"
+    read, refusals = 0, 0
+    for page in range(1, len(whole) // 4096):
+        for filling in (b"\xff", b"\x00"):
+            path.write_bytes(whole[: page * 4096] + filling * 4096 + whole[(page + 1) * 4096 :])
+            if not _can_be_opened(path):
+                refused(path, "none of this SQLite file")
+                refusals += 1
+                continue
+            found, losses = _read(path)
+            read += 1
+            # What is in the middle of a message nothing protects, nor its last page.
+            sound = [each for each in found if each in recorded]
+            changed = [each for each in found if each not in recorded]
+            assert len(changed) <= 1
+            assert all(each[:2] in {known[:2] for known in recorded} for each in changed)
+            if len(sound) + len(changed) < len(recorded):
+                assert losses
+    assert read > 20
+    assert refusals < 8
 
 
 def test_damaged_pages(tmp_path: Path) -> None:
@@ -82,7 +327,44 @@ def test_damaged_pages(tmp_path: Path) -> None:
     data = bytearray(path.read_bytes())
     data[4096 : len(data)] = b"\xff" * (len(data) - 4096)
     path.write_bytes(data)
-    refused(path, "cannot be read")
+    refused(path, "none of this SQLite file", "copy it again")
+
+
+def test_a_row_without_bytes_is_named(tmp_path: Path) -> None:
+    path = bags.write_bare_db3(tmp_path / "a.db3")
+    _execute(path, "UPDATE messages SET data = 'text' WHERE id = 2")
+    found, losses = _read(path)
+    missing = bags.SAMPLE[1]
+    assert len(found) == len(bags.SAMPLE) - 1
+    assert missing.log_time_ns in {each.log_time_ns for each in bags.SAMPLE}
+    assert [(str(each.cause), each.place, each.topic, each.messages) for each in losses] == [
+        ("damaged", "message 2", missing.topic, 1)
+    ]
+
+
+def test_the_chain_of_a_row_that_leads_into_another_row_is_not_followed(tmp_path: Path) -> None:
+    """SQLite would return the bytes of the other one without a word; here, where the file ends early, nothing does."""
+    messages = [bags.recorded_map(f"/r{each}/map", bags.START + each, seed=each, rows=400) for each in range(3)]
+    whole = bytearray(bags.write_bare_db3(tmp_path / "a.db3", messages).read_bytes())
+    places = [_page_of(whole, bags.as_cdr(each)) for each in messages]
+    pointer = whole[places[0] : places[0] + 4]
+    assert int.from_bytes(pointer, "big") * 4096 == places[0] + 2 * 4096 or pointer
+    whole[places[1] : places[1] + 4] = pointer
+    (tmp_path / "cut").mkdir()
+    path = tmp_path / "cut" / "cut.db3"
+    path.write_bytes(whole[:-4096])
+    found, losses = _read(path)
+    assert found == []
+    assert [str(each.cause) for each in losses] == ["ends_early"]
+
+
+def _page_of(whole: bytes, data: bytes) -> int:
+    """Return where an overflow page from the middle of a message begins."""
+    middle = len(data) // 2
+    return whole.index(data[middle : middle + 32]) // 4096 * 4096
+
+
+# --- whole files
 
 
 def test_without_an_index_on_time(tmp_path: Path) -> None:

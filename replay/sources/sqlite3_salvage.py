@@ -1,0 +1,391 @@
+"""Rows of SQLite files that SQLite refuses, or of which it would return wrong ones: read from the pages themselves.
+
+SQLite has no checksums, and takes whatever page a damaged one points to for the one that it needs. So a row counts here
+only if all of it is there: its page is sound in itself, its record has the length that its parts add up to, and its
+overflow pages are all in the file, are no other row's, and end where the row does.
+"""
+
+from __future__ import annotations
+
+import re
+import sqlite3
+import struct
+from array import array
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from typing import BinaryIO, NamedTuple
+
+_LEAF, _INTERIOR = 0x0D, 0x05
+_HEADER_BYTES = 100
+_LARGEST_KEY = (1 << 63) - 1
+_INTEGER_SIZES = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8}
+_DEEPEST = 20
+# enough for the numbers that a row begins with
+_HEAD_BYTES = 64
+_CREATE = re.compile(r"CREATE TABLE [^()]*\(", re.IGNORECASE)
+_TREE = -1
+
+Value = int | float | str | bytes | None
+
+
+class BadPageError(Exception):
+    """A page, or a row of it, is not what it should be."""
+
+
+class Header(NamedTuple):
+    """What a file says of its pages; ``pages`` is None where that is not up to date."""
+
+    page_bytes: int
+    usable_bytes: int
+    pages: int | None
+
+
+def read_header(file: BinaryIO) -> Header | None:
+    """Return what the header of a SQLite file says; None if it cannot be right."""
+    file.seek(0)
+    head = file.read(_HEADER_BYTES)
+    if len(head) < _HEADER_BYTES:
+        return None
+    # The header stores 65536 as 1, and says at which change its count of pages was right.
+    stored, reserved = struct.unpack_from(">H", head, 16)[0], head[20]
+    changed, pages = struct.unpack_from(">II", head, 24)
+    (valid_for,) = struct.unpack_from(">I", head, 92)
+    page_bytes = 65536 if stored == 1 else stored
+    if page_bytes < 512 or page_bytes & (page_bytes - 1) or page_bytes - reserved < 480:
+        return None
+    return Header(page_bytes, page_bytes - reserved, pages if changed == valid_for and pages else None)
+
+
+class Cell(NamedTuple):
+    """Where a row is.
+
+    Parameters
+    ----------
+    size
+        Length of its record.
+    start, local_bytes
+        Where in the file its record begins, and how much of it is there.
+    overflow
+        The page with what follows; 0 if nothing does.
+    head
+        How its record begins.
+    """
+
+    key: int
+    size: int
+    start: int
+    local_bytes: int
+    overflow: int
+    head: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Keys above ``low`` and up to ``high`` are lost because of a page; ``high`` is None if it is not known."""
+
+    page: int
+    low: int
+    high: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table: its first page, and the names of its columns; that of the key is None in each record."""
+
+    root: int
+    columns: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class Rows:
+    """The rows of a table that are there, in order of key, and what is not."""
+
+    cells: list[Cell] = field(default_factory=list)
+    gaps: list[Gap] = field(default_factory=list)
+
+
+class Pages:
+    """The pages of a SQLite file, as far as they are there."""
+
+    def __init__(self, file: BinaryIO, size: int, header: Header) -> None:
+        self.count = size // header.page_bytes
+        self._file = file
+        self._header = header
+        # whose each page is: a row's key, or that of no row but of the tree
+        self._owners = array("q", bytes(8 * (self.count + 1)))
+
+    def tables(self) -> dict[str, Table]:
+        """Return the tables by name.
+
+        Raises
+        ------
+        BadPageError
+            If not all of them can be told.
+        """
+        rows = self.rows(1)
+        if rows.gaps:
+            raise BadPageError(f"page {rows.gaps[0].page}, which lists the tables, is damaged or missing")
+        tables = {}
+        for _, record in self.records(rows.cells):
+            if len(record) == 5 and record[0] == "table" and isinstance(record[3], int):
+                tables[str(record[1])] = Table(record[3], _columns(str(record[4])))
+        return tables
+
+    def rows(self, root: int, is_row: Callable[[Cell], bool] | None = None) -> Rows:
+        """Return the rows of the table whose first page this is.
+
+        Parameters
+        ----------
+        is_row
+            By which rows of this table are known from those of others, to find those of which the pages that point to
+            them are lost; None not to look for them.
+        """
+        rows = Rows()
+        self._walk(root, 0, None, rows, _DEEPEST)
+        if rows.gaps and is_row is not None:
+            self._find_orphans(rows, is_row)
+        rows.cells.sort(key=lambda cell: cell.key)
+        return rows
+
+    def records(self, cells: Sequence[Cell]) -> Iterator[tuple[int, list[Value]]]:
+        """Yield key and values of rows; those that are not whole are left out."""
+        for cell in cells:
+            try:
+                yield cell.key, record_of(self.payload(cell))
+            except BadPageError:
+                continue
+
+    def whole(self, cells: Sequence[Cell]) -> list[Cell]:
+        """Return the rows whose overflow pages are all there, and no other row's."""
+        bad = set()
+        for cell in cells:
+            try:
+                for page in self._chain(cell):
+                    owner = self._owners[page]
+                    if owner not in {0, cell.key}:
+                        bad |= {cell.key, owner}
+                    self._owners[page] = self._owners[page] or cell.key
+            except BadPageError:
+                bad.add(cell.key)
+        return [cell for cell in cells if cell.key not in bad]
+
+    def payload(self, cell: Cell) -> bytes:
+        """Return the record of a row.
+
+        Raises
+        ------
+        BadPageError
+            If not all of it is there.
+        """
+        self._file.seek(cell.start)
+        parts, left = [self._file.read(cell.local_bytes)], cell.size - cell.local_bytes
+        for page in self._chain(cell):
+            self._file.seek((page - 1) * self._header.page_bytes + 4)
+            parts.append(self._file.read(min(left, self._header.usable_bytes - 4)))
+            left -= len(parts[-1])
+        return b"".join(parts)
+
+    def _chain(self, cell: Cell) -> Iterator[int]:
+        """Yield the overflow pages of a row."""
+        page, left = cell.overflow, cell.size - cell.local_bytes
+        while left > 0:
+            if not 2 <= page <= self.count:
+                raise BadPageError(f"overflow page {page} is missing")
+            yield page
+            self._file.seek((page - 1) * self._header.page_bytes)
+            (page,) = struct.unpack(">I", self._file.read(4))
+            left -= self._header.usable_bytes - 4
+        if page:
+            raise BadPageError("its overflow pages go on after its end")
+
+    def _page(self, number: int) -> bytes:
+        if not 1 <= number <= self.count:
+            raise BadPageError(f"page {number} is missing")
+        self._file.seek((number - 1) * self._header.page_bytes)
+        return self._file.read(self._header.usable_bytes)
+
+    def _walk(self, number: int, low: int, high: int | None, rows: Rows, depth: int) -> None:
+        """Take in the rows with keys above ``low`` and up to ``high`` that are at and below a page."""
+        try:
+            page = self._page(number)
+            if not depth or self._owners[number]:
+                raise BadPageError(f"page {number} has two places")
+            start = _HEADER_BYTES if number == 1 else 0
+            if page[start] == _LEAF:
+                cells = self._leaf(number, page, start, low, high)
+                children: list[tuple[int, int | None]] = []
+            else:
+                cells, children = [], _children(page, start, low, high)
+        except (BadPageError, IndexError, struct.error):
+            rows.gaps.append(Gap(number, low, high))
+            return
+        self._owners[number] = _TREE
+        rows.cells += cells
+        for child, key in children:
+            self._walk(child, low, key, rows, depth - 1)
+            low = key or low
+
+    def _leaf(self, number: int, page: bytes, start: int, low: int, high: int | None) -> list[Cell]:
+        """Return the rows of a leaf page; none of them unless all of them are sound."""
+        (count,) = struct.unpack_from(">H", page, start + 3)
+        places = struct.unpack_from(f">{count}H", page, start + 8)
+        cells, extents = [], []
+        for place in places:
+            cell, end = self._cell(number, page, place)
+            if not low < cell.key <= (_LARGEST_KEY if high is None else high):
+                raise BadPageError("keys are not in order")
+            low = cell.key
+            cells.append(cell)
+            extents.append((place, end))
+        extents.sort()
+        ends = [start + 8 + 2 * count, *(end for _, end in extents)]
+        if any(place < end for (place, _), end in zip(extents, ends, strict=False)) or ends[-1] > len(page):
+            raise BadPageError("rows overlap")
+        return cells
+
+    def _cell(self, number: int, page: bytes, place: int) -> tuple[Cell, int]:
+        size, at = varint(page, place)
+        key, at = varint(page, at)
+        local_bytes = self._local_bytes(size)
+        end = at + local_bytes
+        head = page[at : min(end, at + _HEAD_BYTES)]
+        record_sizes(head, size)
+        start = (number - 1) * self._header.page_bytes + at
+        if local_bytes == size:
+            return Cell(key, size, start, local_bytes, 0, head), end
+        (overflow,) = struct.unpack_from(">I", page, end)
+        return Cell(key, size, start, local_bytes, overflow, head), end + 4
+
+    def _local_bytes(self, size: int) -> int:
+        """Return how much of a row of this length is in its own page, as the file format has it."""
+        usable = self._header.usable_bytes
+        most, least = usable - 35, (usable - 12) * 32 // 255 - 23
+        if size <= most:
+            return size
+        fitting = least + (size - least) % (usable - 4)
+        return fitting if fitting <= most else least
+
+    def _find_orphans(self, rows: Rows, is_row: Callable[[Cell], bool]) -> None:
+        """Take in rows of pages whose parent is lost.
+
+        An overflow page is never taken for one: it begins with the number of a page, which is less than 2 ** 24 in any
+        file of less than 64 GB.
+        """
+        if self.count >= _LEAF << 24:
+            return
+        known = {cell.key for cell in rows.cells}
+        for number in range(2, self.count + 1):
+            if self._owners[number]:
+                continue
+            try:
+                page = self._page(number)
+                cells = self._leaf(number, page, 0, 0, None) if page[0] == _LEAF else []
+            except (BadPageError, IndexError, struct.error):
+                continue
+            if cells and all(map(is_row, cells)) and _belong(cells, rows, known):
+                self._owners[number] = _TREE
+                rows.cells += cells
+                known.update(cell.key for cell in cells)
+
+
+def _belong(cells: Sequence[Cell], rows: Rows, known: set[int]) -> bool:
+    """Tell whether all these rows are among those that are lost."""
+    first, last = cells[0].key, cells[-1].key
+    within = any(gap.low < first and (gap.high is None or last <= gap.high) for gap in rows.gaps)
+    return within and not any(cell.key in known for cell in cells)
+
+
+def _children(page: bytes, start: int, low: int, high: int | None) -> list[tuple[int, int | None]]:
+    """Return the pages below an interior page, each with the largest key that it may have."""
+    if page[start] != _INTERIOR:
+        raise BadPageError("it is no page of a table")
+    count, _, _, last = struct.unpack_from(">HHBI", page, start + 3)
+    children: list[tuple[int, int | None]] = []
+    for place in struct.unpack_from(f">{count}H", page, start + 12):
+        (child,) = struct.unpack_from(">I", page, place)
+        key, _ = varint(page, place + 4)
+        if not low < key <= (_LARGEST_KEY if high is None else high):
+            raise BadPageError("keys are not in order")
+        children.append((child, key))
+        low = key
+    return [*children, (last, high)]
+
+
+def varint(data: bytes, at: int) -> tuple[int, int]:
+    """Return a number of one to nine bytes, and where what follows it begins."""
+    value = 0
+    for index in range(8):
+        byte = data[at + index]
+        value = value << 7 | byte & 0x7F
+        if byte < 0x80:
+            return value, at + index + 1
+    value = value << 8 | data[at + 8]
+    return (value - (1 << 64) if value >> 63 else value), at + 9
+
+
+def record_sizes(record: bytes, size: int) -> tuple[int, list[int]]:
+    """Return where the values of a record begin, and the kinds of its values.
+
+    Raises
+    ------
+    BadPageError
+        If they do not add up to the record's length.
+    """
+    end, at = varint(record, 0)
+    if not 0 < end <= len(record):
+        raise BadPageError("it has no header of a record")
+    kinds = []
+    while at < end:
+        kind, at = varint(record, at)
+        kinds.append(kind)
+    if at != end or end + sum(map(_value_bytes, kinds)) != size:
+        raise BadPageError("its values do not add up to its length")
+    return end, kinds
+
+
+def _value_bytes(kind: int) -> int:
+    if kind in {10, 11} or kind < 0:
+        raise BadPageError("it has a value of no kind")
+    if kind >= 12:
+        return (kind - 12) // 2
+    return 8 if kind == 7 else _INTEGER_SIZES.get(kind, 0)
+
+
+def record_of(record: bytes, size: int | None = None) -> list[Value]:
+    """Return the values of a record; of its beginning, if ``size`` says how long it is, those that are in it."""
+    at, kinds = record_sizes(record, len(record) if size is None else size)
+    values: list[Value] = []
+    for kind in kinds:
+        length = _value_bytes(kind)
+        if at + length > len(record):
+            break
+        values.append(_value(kind, record[at : at + length]))
+        at += length
+    return values
+
+
+def _value(kind: int, content: bytes) -> Value:
+    if kind == 0:
+        return None
+    if kind in {8, 9}:
+        return kind - 8
+    if kind == 7:
+        return float(struct.unpack(">d", content)[0])
+    if kind >= 12:
+        return content.decode("utf-8", "replace") if kind % 2 else content
+    return int.from_bytes(content, "big", signed=True)
+
+
+def _columns(sql: str) -> tuple[str, ...]:
+    """Return the names of a table's columns, as SQLite understands what made it."""
+    if not _CREATE.match(sql) or len(sql) > 1 << 16:
+        return ()
+    with closing(sqlite3.connect(":memory:")) as database:
+        try:
+            database.execute(sql)
+            (name,) = database.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchone()
+            quoted = str(name).replace('"', '""')
+            return tuple(row[1] for row in database.execute(f'PRAGMA table_info("{quoted}")'))
+        except (sqlite3.Error, TypeError):
+            return ()
