@@ -12,6 +12,9 @@ from replay.robot_names import file_names, is_costmap_or_mask, names_in, namespa
 from replay.runs import RunPath, TopicChoice
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, SourceInfo
 
+MOST_UNNAMED = 100
+"""Every pair of robots is matched: of more robots than this, somebody must have meant it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Selected:
@@ -66,6 +69,11 @@ def select(
     if not wanted:
         said = " ".join(f"--topic {choice.topic}" for choice in topics)
         raise UsageError(f"{said}: there is no map that fits; there are: {there}")
+    if robots is None and len(wanted) > MOST_UNNAMED:
+        raise UsageError(
+            f"there are maps of {len(wanted)} robots; more than {MOST_UNNAMED} are merged only if they are named, as "
+            f"--robots {','.join(wanted[:2])}; there are: {there}"
+        )
     selected = []
     for robot in wanted:
         candidates = found.get(robot) or _by_component(robot, runs, infos, topics, counts)

@@ -77,6 +77,17 @@ class TestNames:
         assert ran.err.count("\n") == 1
 
 
+def test_very_many_robots_are_merged_only_if_they_are_named(replay: Program, tmp_path: Path) -> None:
+    run = write_mcap(
+        tmp_path / "run.mcap", [seen("r1", 0.0, topic=f"/r{n}/map") for n in range(101)], chunk_bytes=1 << 20
+    )
+    ran = replay.merge(run)
+    assert ran.status == 2
+    assert ran.error.startswith("there are maps of 101 robots; more than 100 are merged only if they are named")
+    assert len(ran.err) < 1500
+    assert replay.merge(run, "--robots", "r1").status == 0
+
+
 def test_many_topics_are_not_all_listed(replay: Program, tmp_path: Path) -> None:
     bad = seen("r1", 0.0, width=0, height=0, data=seen("r1", 0.0).fields["data"][:0])
     many = [Recorded(f"/r{number}/local_costmap", bad.msgtype, bad.log_time_ns, bad.fields) for number in range(2000)]
