@@ -43,7 +43,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # from complaining at exit.
         _drop_output()
         return EXIT_DONE
-    except Exception:  # noqa: BLE001 - a bug of ours must still end with a status and a word
+    except SystemExit:
+        raise
+    except BaseException:  # noqa: BLE001 - a bug, or a panic of Rust below, must still end with a status and a word
         import traceback
 
         traceback.print_exc()

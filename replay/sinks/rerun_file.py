@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from dataclasses import asdict
 from uuid import NAMESPACE_URL, UUID, uuid5
 
@@ -10,6 +11,7 @@ import rerun as rr
 
 from mapmerge.config import CellConfig
 from mapmerge.match import CALIBRATED
+from replay.errors import OutputError
 from replay.events import Event, Finished, Merged, Noted, Report, RobotPicture, Skipped, Started
 from replay.options import NS_PER_S, OutputOptions
 from replay.sinks import rerun_text as text
@@ -52,8 +54,9 @@ class RerunSink:
 
     def discard(self) -> None:
         """Remove the recording."""
-        if self._writer is not None:
-            self._writer.stream.close()
+        with suppress(OutputError), rerun_errors(self._file.path):
+            if self._writer is not None:
+                self._writer.stream.close()
         self._file.discard()
 
 
