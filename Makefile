@@ -7,7 +7,7 @@ TOOLS := .venv-tools
 PINNED := install --quiet --require-hashes --requirement
 PROJECT := install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: demo test check format docs bench picture lock audit clean
+.PHONY: demo test check format docs bench faults picture lock audit clean
 
 demo: $(VENV)/.runtime ## set up and merge a sample recording
 	mkdir -p out
@@ -31,6 +31,9 @@ docs: $(VENV)/.dev ## write docs/cli.md anew from --help
 
 bench: $(VENV)/.dev ## measure placements against known truth
 	$(BIN)/python -m benchmarks.truth
+
+faults: $(VENV)/.dev ## try damaged recordings for a minute
+	$(BIN)/python -m benchmarks.faults --seconds 60
 
 picture: $(VENV)/.runtime ## take README's picture anew; needs a graphics card or a software renderer (mesa-vulkan-drivers)
 	mkdir -p out

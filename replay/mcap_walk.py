@@ -11,6 +11,7 @@ from mcap.records import Attachment, Channel, Header, Metadata, Schema
 from replay.errors import InputError
 from replay.sinks.mcap_copy import McapCopy
 from replay.sources.boundary import translated
+from replay.sources.mcap_chunk import BadPart, chunk_content, inner_records
 from replay.sources.mcap_records import (
     CHANNEL,
     CHUNK,
@@ -109,12 +110,18 @@ class Walk:
     def _items(self, record: Record) -> Iterator[_Item]:
         """Yield what a record says: of a chunk, all the records in it."""
         if record.opcode == CHUNK:
-            chunk = self._records.chunk(record.start)
-            for inner in self._records.inner_records(chunk, record.start):
+            chunk = self._chunk(record.start)
+            for inner in inner_records(chunk):
                 if inner.opcode in {SCHEMA, CHANNEL, MESSAGE}:
                     yield self._item(chunk[inner.start : inner.end], inner.opcode)
         elif record.opcode == MESSAGE or record.opcode in _PARSERS:
             yield self._item(self._records.record_bytes(record.start), record.opcode)
+
+    def _chunk(self, start: int) -> bytes:
+        try:
+            return chunk_content(self._records, start)[0]
+        except BadPart as error:
+            raise InputError(f"{self._records.path}: the chunk at byte {start} is damaged: {error.detail}") from error
 
     def _item(self, record: bytes, opcode: int) -> _Item:
         if opcode == MESSAGE:

@@ -57,9 +57,14 @@ class Plan:
         return list(dict.fromkeys(feed.source for feed in self.transform_feeds))
 
     def unused_topics(self) -> list[str]:
-        """Return the map topics with messages that are no robot's in this run, in order of name."""
+        """Return the map topics with messages that are no robot's in this run, in order of name.
+
+        Updates of parts of maps are named where their map is not there; else its own name tells of them.
+        """
         used = {topic for feed in self.feeds for topic in feed.robot_of}
         there = {item.name for info in self.infos for item in info.topics if item.msgtype == GRID_TYPE}
+        updates = {item.name for info in self.infos for item in info.topics if item.msgtype == UPDATE_TYPE}
+        there |= {name for name in updates if name.removesuffix("_updates") not in there}
         empty = {item.name for info in self.infos for item in info.topics if item.message_count == 0}
         return sorted(there - used - empty)
 

@@ -18,7 +18,8 @@ from replay.sinks.mcap_copy import McapCopy
 from replay.sinks.partial_file import PartialFile
 from replay.sinks.publication import publish
 from replay.sources.boundary import translated
-from replay.sources.mcap_records import MAGIC, RecordFile
+from replay.sources.mcap_chunk import MOST_BYTES
+from replay.sources.mcap_records import MAGIC, RecordFile, written_bytes
 from replay.words import counted, moment, recovered
 
 _LEFT_OUT_NAMED = 5
@@ -126,4 +127,4 @@ def _opened(path: Path) -> Iterator[RecordFile]:
             raise InputError(f"{path}: it is empty, so there is nothing to recover")
         if magic != MAGIC:
             raise InputError(f"{path}: it does not begin as an MCAP does; expected one that was cut off")
-        yield RecordFile(path, file, size)
+        yield RecordFile(path, file, size, written_bytes(file, size), MOST_BYTES)

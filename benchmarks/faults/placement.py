@@ -1,0 +1,75 @@
+"""Where maps truly lie: told by their cells, because a damaged recording may give them another name or origin."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from benchmarks.faults.world import FLOOR_FROM_MAP, PARTS_M, RESOLUTION_M, STRANGER, robot_map
+from mapmerge.grid import Grid
+from mapmerge.sim2 import Sim2, wrap_angle
+from replay.events import Merged
+
+MOST_M, MOST_DEG = 0.30, 3.0
+"""Two cells: what may come of a map of which a part is damaged."""
+_LEAST_ALIKE = 0.8
+
+
+def misplaced(event: Merged, latest: Mapping[str, Grid]) -> list[str]:
+    """Return which maps are placed where their cells do not lie, in words."""
+    robots = event.result.robots
+    reference = next(iter(robots))
+    if reference not in latest:
+        return []
+    found = []
+    for robot, outcome in robots.items():
+        if robot == reference or outcome.merged_from_map is None or robot not in latest:
+            continue
+        error = error_of(reference, latest[reference], robot, latest[robot], outcome.merged_from_map)
+        if error:
+            found.append(f"{robot} is placed {error}")
+    return found
+
+
+def error_of(reference: str, target: Grid, robot: str, source: Grid, target_from_source: Sim2) -> str:
+    """Return what is wrong with a placement; "" if nothing."""
+    true_target, true_source = _owner(target, reference), _owner(source, robot)
+    if (true_target == STRANGER) != (true_source == STRANGER):
+        return f"though its map is of {true_source} and the reference's of {true_target}"
+    cell = np.array([[source.cols / 2, source.rows / 2]])
+    found_m = target.map_from_grid.inverse().apply(
+        target_from_source.apply(source.map_from_grid.apply(cell * source.resolution_m))
+    )
+    true = FLOOR_FROM_MAP[true_target].inverse() @ FLOOR_FROM_MAP[true_source]
+    # In cells, so that a resolution that is not the true one shows as well.
+    off = found_m[0] / target.resolution_m - true.apply(cell * RESOLUTION_M)[0] / RESOLUTION_M
+    off_m = float(np.hypot(*off)) * RESOLUTION_M
+    yaw_rad = target_from_source.yaw_rad + source.map_from_grid.yaw_rad - target.map_from_grid.yaw_rad
+    off_deg = abs(math.degrees(wrap_angle(yaw_rad - true.yaw_rad)))
+    return "" if off_m <= MOST_M and off_deg <= MOST_DEG else f"{off_m:.2f} m and {off_deg:.1f}° from where it lies"
+
+
+def _owner(grid: Grid, name: str) -> str:
+    """Return whose map this is: told by its cells or, where they are like nobody's, by its name."""
+    alike = {robot: _alike(grid, robot) for robot in FLOOR_FROM_MAP}
+    best = max(alike, key=lambda robot: alike[robot])
+    known = name if name in FLOOR_FROM_MAP else best
+    return best if alike[best] >= _LEAST_ALIKE else known
+
+
+def _alike(grid: Grid, robot: str) -> float:
+    """Return the largest share of cells that are the same in one of a robot's maps, of those known in either."""
+    return max((_same(grid.cells, cells) for cells in _all_cells(robot) if cells.shape == grid.cells.shape), default=0)
+
+
+@functools.cache
+def _all_cells(robot: str) -> list[np.ndarray]:
+    return [robot_map(robot, part).cells for part in range(len(PARTS_M))]
+
+
+def _same(cells: np.ndarray, others: np.ndarray) -> float:
+    known = (cells >= 0) | (others >= 0)
+    return float(np.mean(cells[known] == others[known])) if known.any() else 0.0

@@ -1,0 +1,78 @@
+"""A merger that remembers: most variants of a recording say what others have said, and merging takes longest.
+
+A step's result is a value that depends on nothing but the steps before it, so that the same steps have it again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+from mapmerge.config import MergeConfig
+from mapmerge.evidence import Evidence
+from mapmerge.grid import Grid
+from mapmerge.merger import Merger, MergeResult
+from mapmerge.outcome import Pair
+from mapmerge.prior import Prior
+
+_MOST = 3000
+_known: OrderedDict[bytes, MergeResult] = OrderedDict()
+
+
+class RememberingMerger:
+    """Stands in for `Merger` in a run: computes only what no run before it in this process has computed."""
+
+    def __init__(self, robots: Sequence[str], config: MergeConfig, mapped: Callable[..., Iterable[Any]] = map) -> None:
+        self._new: Callable[[], Merger] = lambda: Merger(robots, config, mapped)
+        self._merger: Merger | None = None
+        self._steps: list[tuple[Mapping[str, Grid], Mapping[str, Prior], bool]] = []
+        self._key = hashlib.sha256(repr((tuple(robots), config)).encode())
+        self._result: MergeResult | None = None
+        self.latest: dict[str, Grid] = {}
+        """The last map of each robot."""
+
+    @property
+    def result(self) -> MergeResult:
+        """All that is known after the last step."""
+        return self._computed().result if self._result is None else self._result
+
+    def explain(self, pair: Pair) -> tuple[Evidence, ...]:
+        """Return what the merger saw of a pair."""
+        return self._computed().explain(pair)
+
+    def step(
+        self, grids: Mapping[str, Grid], priors: Mapping[str, Prior] | None = None, *, is_last: bool = False
+    ) -> MergeResult:
+        """Take in new maps, as `Merger.step`."""
+        self.latest.update(grids)
+        self._steps.append((grids, dict(priors or {}), is_last))
+        self._key.update(_text(grids, priors or {}, is_last=is_last))
+        key = self._key.digest()
+        found = _known.get(key)
+        if found is None:
+            found = _known[key] = self._computed().result
+            while len(_known) > _MOST:
+                _known.popitem(last=False)
+        else:
+            _known.move_to_end(key)
+        self._result = found
+        return found
+
+    def _computed(self) -> Merger:
+        """Return a merger that has taken all steps so far."""
+        if self._merger is None:
+            self._merger = self._new()
+        steps, self._steps = self._steps, []
+        for grids, priors, is_last in steps:
+            self._merger.step(grids, priors, is_last=is_last)
+        return self._merger
+
+
+def _text(grids: Mapping[str, Grid], priors: Mapping[str, Prior], *, is_last: bool) -> bytes:
+    parts = [repr((is_last, sorted(priors.items()))).encode()]
+    for robot, grid in grids.items():
+        head = (robot, grid.cells.shape, grid.resolution_m, grid.map_from_grid)
+        parts += [repr(head).encode(), hashlib.sha256(grid.cells.tobytes()).digest()]
+    return b"\n".join(parts)

@@ -1,0 +1,305 @@
+"""What becomes of damaged recordings, and whether a wrong outcome would be noticed."""
+
+import sys
+from collections import OrderedDict
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.faults import __main__ as command
+from benchmarks.faults import placement, remembered, worker
+from benchmarks.faults.cases import Case, Task, cases
+from benchmarks.faults.formats import FORMATS, undamaged
+from benchmarks.faults.mcap_layout import closed, parsed
+from benchmarks.faults.oracle import Expected, Judged, Verdict, judge
+from benchmarks.faults.pool import Worker, run_all
+from benchmarks.faults.printed import Counts
+from benchmarks.faults.runner import Named, Ran, Used
+from benchmarks.faults.table import FAULTS
+from benchmarks.faults.world import FLOOR_FROM_MAP, changed, messages, robot_map
+from mapmerge.grid import Grid
+from mapmerge.merger import Merger
+from mapmerge.sim2 import Sim2
+from replay.sources import open_source
+from replay.sources.base import RawMessage
+from replay.sources.mcap_file import McapFile
+
+SEED = 7
+ONE, TWO, OTHER = Used("/r1/map", 1, "aa"), Used("/r2/map", 2, "bb"), Used("/r2/map", 2, "cc")
+EXPECTED = Expected(frozenset({ONE, TWO}), ("r1", "r2", "dd"), "run.mcap", ("r1", "r2"), is_checked=True)
+RIGHT = Ran(used=(ONE, TWO), merged=("r1", "r2", "dd"))
+LOST = Ran(used=(ONE,), merged=("r1",))
+
+
+def said(messages=1):
+    return Named("damaged", "", 2, "the chunk at byte 7", "its checksum is wrong", messages)
+
+
+def run_one(case="mcap_zstd/mcap_footer_wrong/0"):
+    return worker.answer(Task(Case.named(case, SEED)))
+
+
+class TestOracle:
+    @pytest.mark.parametrize(
+        ("ran", "verdict"),
+        [
+            (RIGHT, Verdict.RIGHT),
+            (replace(LOST, named=(said(),)), Verdict.NAMED),
+            (replace(LOST, named=(said(None),)), Verdict.NAMED),
+            (replace(LOST, unused=1), Verdict.NAMED),
+            (Ran(error="/x/run.mcap: it cannot be read"), Verdict.ERROR),
+            (Ran(error="the clocks of r1 and r2 cannot be the same", is_usage=True), Verdict.ERROR),
+            (Ran(crash="Traceback"), Verdict.CRASHED),
+            (Ran(hung=True), Verdict.HUNG),
+        ],
+    )
+    def test_tells_what_may_be(self, ran, verdict):
+        assert judge(ran, EXPECTED).verdict is verdict
+
+    @pytest.mark.parametrize(
+        ("ran", "why"),
+        [
+            (LOST, "nothing was said"),
+            (replace(LOST, used=(), named=(said(),)), "of 1 nothing was said"),
+            (replace(RIGHT, used=(ONE, OTHER)), "a checksum tells"),
+            (replace(RIGHT, used=(ONE, OTHER), named=(said(),)), "a checksum tells"),
+            (replace(RIGHT, misplaced=("r2 is placed 3 m from where it lies",)), "3 m"),
+            (replace(RIGHT, merged=("r1", "r2", "ee")), "the same messages gave"),
+            (replace(RIGHT, program="it ended with 3"), "ended with 3"),
+            (Ran(error="it cannot be read"), "does not name"),
+            (Ran(error="the clocks of r1 cannot be read"), "does not name"),
+            (Ran(error="run.mcap: it cannot\nbe read"), "not one line"),
+        ],
+    )
+    def test_tells_what_must_not_be(self, ran, why):
+        judged = judge(ran, EXPECTED)
+        assert judged.verdict is Verdict.WRONG
+        assert why in judged.why
+
+    def test_believed_bytes_without_a_checksum_are_a_category_of_their_own(self):
+        unchecked = replace(EXPECTED, is_checked=False)
+        assert judge(replace(RIGHT, used=(ONE, OTHER)), unchecked).verdict is Verdict.UNPROTECTED
+        assert judge(LOST, unchecked).verdict is Verdict.WRONG
+        assert judge(LOST, replace(unchecked, leaves_no_trace=True)).verdict is Verdict.UNPROTECTED
+        misplaced = replace(RIGHT, used=(ONE, OTHER), misplaced=("r2",))
+        assert judge(misplaced, unchecked).verdict is Verdict.WRONG
+
+
+class TestFakeFailures:
+    """Each replaces a part of the program by one that fails, and looks whether that is noticed."""
+
+    @pytest.fixture(autouse=True)
+    def known(self):
+        """What is right is known before anything fails."""
+        worker.undamaged_run("mcap_zstd")
+
+    def test_the_program_as_it_is(self):
+        assert run_one().verdict is Verdict.RIGHT
+
+    def test_a_message_dropped_in_silence(self, monkeypatch):
+        whole = McapFile.messages
+
+        def some(self, topics):
+            for number, raw in enumerate(whole(self, topics)):
+                if number != 3:
+                    yield raw
+
+        monkeypatch.setattr(McapFile, "messages", some)
+        judged = run_one()
+        assert judged.verdict is Verdict.WRONG
+        assert "nothing was said" in judged.why
+
+    def test_a_message_believed_though_its_checksum_is_wrong(self, monkeypatch):
+        whole = McapFile.messages
+
+        def altered(self, topics):
+            for raw in whole(self, topics):
+                yield replace(raw, data=bytes(raw.data)[:-1] + b"\x05")
+
+        monkeypatch.setattr(McapFile, "messages", altered)
+        judged = run_one()
+        assert judged.verdict is Verdict.WRONG
+        assert "a checksum tells" in judged.why
+
+    def test_an_exception_that_is_no_error_of_ours(self, monkeypatch):
+        def broken(*given):
+            raise KeyError(given)
+
+        monkeypatch.setattr(McapFile, "messages", broken)
+        judged = run_one()
+        assert judged.verdict is Verdict.CRASHED
+        assert "KeyError" in judged.why
+
+    def test_maps_placed_where_they_do_not_lie(self, monkeypatch):
+        step = Merger.step
+
+        def shifted(self, grids, priors=None, *, is_last=False):
+            result = step(self, grids, priors, is_last=is_last)
+            robots = {
+                robot: replace(found, merged_from_map=Sim2(0.5) @ found.merged_from_map)
+                if robot == "r2" and found.merged_from_map
+                else found
+                for robot, found in result.robots.items()
+            }
+            return replace(result, robots=robots)
+
+        monkeypatch.setattr(Merger, "step", shifted)
+        monkeypatch.setattr(remembered, "_known", OrderedDict())
+        judged = run_one()
+        assert judged.verdict is Verdict.WRONG
+        assert "r2 is placed 0.5" in judged.why
+
+    def test_a_recording_that_was_changed(self, monkeypatch):
+        def careless(path, **_):
+            path.write_bytes(b"")
+            return RIGHT
+
+        monkeypatch.setattr(worker, "run", careless)
+        with pytest.raises(AssertionError, match="was changed"):
+            worker.answer(Task(Case.named("mcap_zstd/truncated/0", SEED)))
+
+    @pytest.mark.parametrize(
+        ("does", "verdict"),
+        [
+            ("import os; os.abort()", Verdict.CRASHED),
+            ("import time; time.sleep(60)", Verdict.HUNG),
+            ("pass", Verdict.CRASHED),
+        ],
+    )
+    def test_a_process_that_dies_or_hangs(self, does, verdict):
+        ready = "import pickle, sys; pickle.dump('ready', sys.stdout.buffer); sys.stdout.buffer.flush()"
+        one = Worker((sys.executable, "-c", f"{ready}; pickle.load(sys.stdin.buffer); {does}"), most_s=2.0)
+        assert one.run(Task(Case("mcap_zstd", "truncated", 0))).verdict is verdict
+
+    def test_a_process_that_does_not_start_is_nobodys_outcome(self):
+        with pytest.raises(RuntimeError, match="does not start"):
+            Worker((sys.executable, "-c", "pass")).run(Task(Case("mcap_zstd", "truncated", 0)))
+
+
+class TestPlacement:
+    def test_a_map_is_known_by_its_cells_whatever_its_name_and_origin(self):
+        moved = Grid(robot_map("r2", 2).cells, 0.15, Sim2(5.0, -3.0, 0.7))
+        true = FLOOR_FROM_MAP["r1"].inverse() @ FLOOR_FROM_MAP["r2"] @ moved.map_from_grid.inverse()
+        target = robot_map("r1", 2)
+        assert placement.error_of("r1", target, "r3", moved, true) == ""
+        assert "m and" in placement.error_of("r1", target, "r3", moved, true @ Sim2(0.4))
+        assert "°" in placement.error_of("r1", target, "r2", moved, true @ Sim2(yaw_rad=0.1))
+        assert "of r3" in placement.error_of("r1", target, "r2", robot_map("r3", 2), true)
+
+    def test_another_resolution_is_another_place(self):
+        wide = Grid(robot_map("r2", 2).cells, 0.2)
+        true = FLOOR_FROM_MAP["r1"].inverse() @ FLOOR_FROM_MAP["r2"]
+        assert placement.error_of("r1", robot_map("r1", 2), "r2", wide, true)
+
+
+class TestFormats:
+    @pytest.mark.parametrize("name", FORMATS)
+    def test_hold_what_is_recorded(self, name, tmp_path):
+        with open_source(undamaged(name).write(tmp_path)) as source:
+            topics = [topic.name for topic in source.info.topics]
+            found = [replace(raw, data=bytes(raw.data)) for raw in source.messages(topics)]
+        assert found == FORMATS[name].raw(messages())
+
+    def test_an_mcap_file_is_the_same_when_written_again(self):
+        data = undamaged("mcap_zstd").files["run.mcap"]
+        assert closed(parsed(data)) != data  # the offset of offsets is left out
+        assert parsed(closed(parsed(data)))[:-1] == parsed(data)[:-1]
+
+
+class TestCases:
+    def test_are_the_same_for_the_same_name(self):
+        for case in cases_of(40):
+            one, again = case.variant(), Case.named(case.name, SEED).variant()
+            assert (one is None) == (again is None)
+            assert one is None or (one.recording, one.told) == (again.recording, again.told)
+
+    def test_every_fault_changes_something(self):
+        for fault, row in FAULTS.items():
+            kind = next(name for name in reversed(FORMATS) if row.fits(FORMATS[name]))
+            variants = [Case(kind, fault, number, SEED).variant() for number in range(6)]
+            whole = undamaged(kind)
+            assert any(each and each.recording != whole for each in variants), fault
+
+    @pytest.mark.parametrize("name", ["", "mcap_zstd/truncated", "mcap_zstd/none/1", "no/truncated/1", "db3/zeroed/x"])
+    def test_a_name_that_is_none(self, name):
+        with pytest.raises(ValueError, match="is no case"):
+            Case.named(name, SEED)
+
+
+def cases_of(count):
+    found = cases(tuple(FORMATS), tuple(FAULTS), SEED)
+    return [next(found) for _ in range(count)]
+
+
+class TestCommand:
+    def test_a_share_of_the_faults_ends_well(self, capsys):
+        assert command.main(["--tries", "120", "--seed", str(SEED), "--jobs", "2", "--by-format"]) == 0
+        *_, total, _, verdict = capsys.readouterr().out.splitlines()
+        assert total.split()[0] == "all"
+        assert total.split()[-3:] == ["0", "0", "0"]
+        assert int(total.split()[1]) > 100
+        assert verdict.startswith("holds")
+
+    def test_a_failure_is_said_with_its_name_kept_and_counted(self, capsys, tmp_path, monkeypatch):
+        class Failing:
+            def run(self, task):
+                return Judged(Verdict.HUNG, "it was stopped") if task.case.number else Judged(Verdict.RIGHT)
+
+            def close(self):
+                pass
+
+        monkeypatch.setattr(command, "run_all", lambda tasks, jobs: run_all(tasks, jobs, Failing))
+        given = ["--tries", "2", "--formats", "db3", "--faults", "zeroed", "--jobs", "1", "--keep", str(tmp_path)]
+        assert command.main(given) == 1
+        shown = capsys.readouterr().out
+        assert "hung: --seed 0 --replay db3/zeroed/1: it was stopped" in shown
+        assert "FAILS  crashed, hung or wrong, of 2: 1" in shown
+        assert (tmp_path / "db3_zeroed_1" / "run.db3").is_file()
+
+    def test_one_case_again(self, capsys, tmp_path):
+        assert command.main(["--replay", "bag_none/emptied/0", "--keep", str(tmp_path)]) == 0
+        assert capsys.readouterr().out.startswith("bag_none/emptied/0: clear error\n")
+        assert (tmp_path / "bag_none_emptied_0" / "run.bag").is_file()
+
+    def test_nothing_new_is_begun_after_the_time(self, capsys):
+        assert command.main(["--seconds", "0", "--jobs", "1"]) == 0
+        assert "of 0: 0" in capsys.readouterr().out
+
+
+def test_counts_are_of_faults_or_of_formats():
+    counts = Counts()
+    for kind, verdict in (("db3", Verdict.RIGHT), ("db3", Verdict.WRONG), ("bag_none", Verdict.NAMED)):
+        counts.add(Case(kind, "zeroed", 0), verdict)
+    assert (counts.tries, counts.failures) == (3, 1)
+    assert [line.split()[:2] for line in counts.lines()][1:] == [["zeroed", "3"], ["all", "3"]]
+    assert [line.split()[:2] for line in counts.lines(by_format=True)][1:] == [
+        ["bag_none", "1"],
+        ["db3", "2"],
+        ["all", "3"],
+    ]
+
+
+def test_equal_steps_are_merged_once(monkeypatch):
+    merges = []
+    step = Merger.step
+    monkeypatch.setattr(Merger, "step", lambda *given, **named: merges.append(1) or step(*given, **named))
+    monkeypatch.setattr(remembered, "_known", OrderedDict())
+    for _ in range(2):
+        worker.undamaged_run.cache_clear()
+        worker.undamaged_run("mcap_none")
+    assert len(merges) == len({each.log_time_ns for each in messages() if each.topic != "/chatter"})
+
+
+def test_messages_are_laid_out_as_the_library_does():
+    from replay.codec import decode
+
+    for each in messages():
+        if each.topic != "/chatter":
+            one, other = (
+                decode(RawMessage(each.topic, each.msgtype, kind, 1, each.data(kind))) for kind in ("cdr", "ros1")
+            )
+            assert one.stamp_ns == other.stamp_ns == each.content.stamp_ns
+    grid = decode(RawMessage("/m", messages()[0].msgtype, "cdr", 1, messages()[0].data("cdr"))).grid
+    assert np.array_equal(grid.cells, robot_map("r1", 0).cells)
+    assert changed(messages()[0], width=3).content.width == 3
