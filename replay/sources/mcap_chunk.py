@@ -46,7 +46,8 @@ class ChunkHead(NamedTuple):
     head_bytes: int
 
 
-CHUNK_HEAD_BYTES = _HEAD.size + 4 + _LENGTH.size
+_LONGEST_NAME_BYTES = 32
+CHUNK_HEAD_BYTES = _HEAD.size + _LONGEST_NAME_BYTES + _LENGTH.size
 
 
 def chunk_head(content: bytes) -> ChunkHead | None:
@@ -62,13 +63,9 @@ def chunk_head(content: bytes) -> ChunkHead | None:
 
 
 def is_consistent(record: Record, content: bytes) -> bool:
-    """Tell whether a chunk's lengths agree with each other, and its compression is one that is read."""
+    """Tell whether a chunk's lengths agree with each other, from how its content begins."""
     head = chunk_head(content)
-    return (
-        head is not None
-        and head.compression in _COMPRESSIONS
-        and head.head_bytes + head.data_bytes == record.end - record.content
-    )
+    return head is not None and head.head_bytes + head.data_bytes == record.end - record.content
 
 
 def chunk_content(file: RecordFile, start: int) -> tuple[bytes, bool]:
@@ -86,9 +83,6 @@ def chunk_content(file: RecordFile, start: int) -> tuple[bytes, bool]:
         raise _too_large(file)
     content = file.content(record)
     head = chunk_head(content)
-    if head is not None and head.compression not in _COMPRESSIONS:
-        name = head.compression.decode(errors="replace")
-        raise BadPart(SkipCause.DAMAGED, f"its compression is '{name}', not lz4, zstd or none")
     if head is None or head.head_bytes + head.data_bytes != len(content):
         raise BadPart(SkipCause.DAMAGED, f"the lengths in it do not fit its {len(content)} bytes")
     plain = _decompressed(head.compression, content[head.head_bytes :], file)
@@ -109,13 +103,13 @@ def cut_chunk_content(file: RecordFile, start: int) -> bytes:
     BadPart
         If what is there is damaged.
     """
-    found = file.head_at(start, CHUNK_HEAD_BYTES + 4)
+    found = file.head_at(start, CHUNK_HEAD_BYTES)
     head = chunk_head(found[1]) if found else None
     if found is None or head is None:
         return b""
     file.file.seek(found[0].content + head.head_bytes)
     # without the zeros at the end of the file, which a decompressor would take for data
-    data = file.file.read(min(file.written - file.file.tell(), file.most_bytes))
+    data = file.file.read(max(0, min(file.written - file.file.tell(), file.most_bytes)))
     plain = _decompressed(head.compression, data, file)
     end = 0
     for record in _records(plain):
@@ -163,6 +157,9 @@ def _decompressed(compression: bytes, data: bytes, file: RecordFile) -> bytes:
     """Return what is in the data, up to a little more than the largest chunk that is read."""
     from zstandard import ZstdError
 
+    if compression not in _COMPRESSIONS:
+        name = compression.decode(errors="replace")
+        raise BadPart(SkipCause.DAMAGED, f"its compression is '{name}', not lz4, zstd or none")
     if not compression:
         return data
     steps = _zstd_steps(data) if compression == b"zstd" else _lz4_steps(data)

@@ -123,11 +123,16 @@ class McapFile(Closing):
     def _known_contents(self) -> Contents:
         """Return what is known of the file, and take in what is known to be lost."""
         contents = self._summary.contents if self._summary else None
-        if contents is None or self.map_scan is not None:
+        if contents is None or not self._has_index(contents) or self.map_scan is not None:
             return self._scanned().contents
         for loss in unknown_types(contents):
             self.losses.add(loss)
         return contents
+
+    def _has_index(self, contents: Contents) -> bool:
+        """Tell whether there is any index of messages, if there are messages."""
+        chunks = self._summary.chunks if self._summary else ()
+        return contents.start_ns is None or any(chunk.message_index_offsets for chunk in chunks)
 
     def _wanted(self, topics: Collection[str], contents: Contents | None = None) -> dict[int, Channel]:
         """Return the channels of these topics whose messages can be used."""

@@ -265,7 +265,7 @@ class RecordFile:
     most_bytes: int
 
     def head_at(self, start: int, content_bytes: int = 0) -> tuple[Record, bytes] | None:
-        """Return what the bytes at ``start`` are as a record, and how its content begins.
+        """Return what the bytes at ``start`` are as a record, and the bytes behind its header.
 
         It may reach beyond the file. None if there are not even enough bytes for a header.
         """
@@ -275,7 +275,7 @@ class RecordFile:
         head = self.file.read(RECORD.size + content_bytes)
         opcode, length = RECORD.unpack_from(head)
         content = start + RECORD.size
-        return Record(opcode, start, content, content + length), head[RECORD.size : RECORD.size + length]
+        return Record(opcode, start, content, content + length), head[RECORD.size :]
 
     def is_whole(self, record: Record) -> bool:
         """Tell whether all of a record is there.

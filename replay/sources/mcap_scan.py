@@ -78,7 +78,7 @@ def scan(file: RecordFile, wanted: Callable[[Channel], bool], summary: Summary |
         elif record.opcode == MESSAGE and walk.data_end is None:
             found.add_loose(record)
         elif record.opcode in {SCHEMA, CHANNEL}:
-            found.describe(record)
+            found.describe(record, is_repeated=walk.data_end is not None)
     return found.scan(walk)
 
 
@@ -103,19 +103,21 @@ class _Found:
         self._file = file
         self._wanted = wanted
         self._summary = summary
-        self._table = ChannelTable()
+        self._table, self._repeated = ChannelTable(), ChannelTable()
         self._is_wanted: dict[int, bool] = {}
         # those that a checksum of their own covers, and the others
         self._covered, self._others = _Messages(), _Messages()
         self._bad_chunks: list[tuple[int, BadPart, Counter[int] | None]] = []
         self._losses: list[Loss] = []
 
-    def describe(self, record: Record) -> None:
-        """Take in a schema or channel outside of chunks."""
+    def describe(self, record: Record, *, is_repeated: bool) -> None:
+        """Take in a schema or channel outside of chunks; behind the data they are only repeated."""
         try:
-            self._table.add(record.opcode, self._file.content(record))
+            table = self._repeated if is_repeated else self._table
+            table.add(record.opcode, self._file.content(record))
         except ValueError as error:
-            self._losses.append(_damaged(record.start, record.end, f"it does not describe a channel: {error}"))
+            if not is_repeated:
+                self._losses.append(_damaged(record.start, record.end, f"it does not describe a channel: {error}"))
 
     def add_chunk(self, record: Record) -> None:
         """Take in a chunk, all of it or nothing."""
@@ -157,20 +159,25 @@ class _Found:
             messages.entries.append(Entry(message.log_time_ns, block, inner, key))
 
     def _known(self) -> ChannelTable:
-        """Return the channels met so far, with those of the summary."""
-        if self._summary is None:
-            return self._table
-        if self._summary.is_checked:
+        """Return the channels met so far, with those that a checked summary describes."""
+        if self._summary is not None and self._summary.is_checked:
             return self._summary.table.completed_by(self._table)
-        return self._table.completed_by(self._summary.table)
+        return self._table
+
+    def _channels(self, counts: Mapping[int, int]) -> dict[int, Channel]:
+        """Return all channels, of those that are described behind the data alone only those that have messages."""
+        described = self._known()
+        known = described.all()
+        completed = described.completed_by(self._repeated).all()
+        return {key: channel for key, channel in completed.items() if key in known or counts.get(key)}
 
     def scan(self, walk: Walk) -> Scan:
         """Return what was found, once all was passed through."""
         if walk.cut_chunk is not None:
             self._add_cut_chunk(walk.cut_chunk)
         self._check_data(walk)
-        channels = self._known().all()
         counts = self._covered.counts + self._others.counts
+        channels = self._channels(counts)
         contents = Contents(channels, counts, *self._times_ns())
         entries = sorted(
             entry
@@ -273,7 +280,7 @@ def chunk_loss(start: int, error: BadPart, lost: Counter[int] | None, channels: 
         place,
         f"{error.detail}; in it are {named}{more}",
         lost.total(),
-        next(iter(topics)) if len(topics) == 1 else "",
+        next(iter(topics)) if len(topics) == 1 and lost.keys() <= channels.keys() else "",
     )
 
 

@@ -43,7 +43,7 @@ from replay.sources.mcap_records import (
 )
 
 _PRIVATE = 0x80
-_HEAD_BYTES = CHUNK_HEAD_BYTES + 4
+_HEAD_BYTES = CHUNK_HEAD_BYTES
 _BLOCK_BYTES = 1 << 20
 _NEAR_NS = 86_400 * 10**9
 _MOST_UNKNOWN = 16
