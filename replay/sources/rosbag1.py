@@ -126,9 +126,14 @@ class Rosbag1File(Closing):
         if is_ended or scan.is_cut:
             detail = f"the file ends early: {reason}"
             self.losses.add(Loss(SkipCause.ENDS_EARLY, f"byte {self._file.size}", detail, scan.lost_at_end))
+        elif self._lost_line_endings():
+            # any byte may be missing anywhere, and no checksum would tell
+            raise InputError(
+                f"{self.path}: {reason}, and the file holds not one CR LF, {TEXT_MODE}; if it was made like this, rebuild "
+                "the index of a copy with `rosbag reindex`"
+            )
         else:
-            cause = f"{reason}; the file holds not one CR LF, {TEXT_MODE}" if self._lost_line_endings() else reason
-            self.losses.add(Loss(SkipCause.DAMAGED, "the index", f"{cause}; messages were found without it", 0))
+            self.losses.add(Loss(SkipCause.DAMAGED, "the index", f"{reason}; messages were found without it", 0))
         return scan
 
     def _distrust_index(self, contents: Contents, misfit: _MisfitError) -> None:
@@ -195,7 +200,9 @@ class _Reading:
             if by_chunk and entry.chunk not in self._checked:
                 self._check(chunk, by_chunk.pop(entry.chunk))
             record = _message_at(chunk, entry)
-            if record is None or not (self._is_scanned or _is_followed(chunk, record)):
+            # Of a chunk without a problem all were checked.
+            is_sure = self._is_scanned or entry.chunk not in self._problems
+            if record is None or not (is_sure or _is_followed(chunk, record)):
                 # named with the chunk
                 continue
             topic = self._contents.topics[entry.connection]
