@@ -112,6 +112,7 @@ class Walk:
         self._file = file
         self._chunk_starts = chunk_starts
         self._has_chunks = bool(chunk_starts)
+        self._has_header = False
         self._time_ns: int | None = None
         self._resumed: tuple[int, int | None] = (-1, None)
 
@@ -129,6 +130,7 @@ class Walk:
                 continue
             if self.data_end is None and self._is_suspicious(record):
                 self.gaps.append(Gap(record.start, record.end, record.opcode))
+            self._has_header |= record.opcode == HEADER
             yield record
             start = record.end
             if record.opcode == DATA_END:
@@ -161,14 +163,21 @@ class Walk:
         self._has_chunks |= record.opcode in {CHUNK, MESSAGE_INDEX}
         if record.opcode not in _SURE and not self._follows(record.end):
             after = self._resume(record.end)
-            if after is not None and not self._begins_damaged(record, after):
+            if after is None:
+                # the end of the file, unless this record reaches over others
+                within = self._resume(record.start)
+                if within is not None and within < record.end:
+                    return None
+            elif not self._begins_damaged(record, after):
                 return None
         if record.opcode == MESSAGE:
             self._time_ns = message_header(head).log_time_ns
         return record
 
     def _is_suspicious(self, record: Record) -> bool:
-        """Tell whether a record is of a type that there is not, or of a private one and yet like the messages here."""
+        """Tell whether a record is of a type that there is not, or not here, or of a private one yet like messages."""
+        if record.opcode == HEADER:
+            return self._has_header
         if record.opcode in _KNOWN or record.opcode < _PRIVATE:
             return record.opcode not in _KNOWN
         if record.end - record.content < MESSAGE_HEAD.size:
