@@ -10,6 +10,7 @@ from typing import Any, Literal
 import pytest
 
 from replay.errors import InputError
+from replay.skip_cause import SkipCause
 from replay.sources import mcap_file, open_source
 from replay.sources.base import RawMessage, SourceInfo
 from replay.sources.rosbag2_folder import merged_by_time
@@ -177,9 +178,25 @@ def test_damage_in_a_compressed_part_names_the_part_not_its_copy(tmp_path: Path)
     path = bags.write_rosbag2(tmp_path / "bag", storage="mcap", compression="file")
     (part,) = path.glob("*.zstd")
     part.write_bytes(zstd.compress(bags.write_mcap(tmp_path / "inner.mcap").read_bytes()[:5000]))
-    _, losses = _read(path)
-    assert [cause for cause, _, _ in losses] == ["ends_early"]
-    assert losses[0][1].startswith(f"{part.name}: ")
+    with open_source(path) as source:
+        found = len(list(source.messages(TOPICS)))
+        assert 0 < found < len(bags.SAMPLE)
+        (loss,) = source.losses.all
+    assert loss.cause == SkipCause.ENDS_EARLY
+    assert loss.place.startswith(f"{part.name}: ")
+
+
+def test_damage_that_shows_only_when_a_part_is_read_is_named_once(tmp_path: Path) -> None:
+    path = bags.write_rosbag2(tmp_path / "bag", storage="mcap")
+    (part,) = path.glob("*.mcap")
+    bags.write_mcap(part)
+    bags.damage(part, next(chunk for chunk in bags.chunks(part) if "/r1/map" in chunk.topics))
+    with open_source(path) as source:
+        assert source.losses.all == ()
+        for _ in range(2):
+            assert 0 < len(list(source.messages(["/r1/map"]))) < 3
+        (loss,) = source.losses.all
+    assert loss.place.startswith(f"{part.name}: the chunk at byte ")
 
 
 def test_a_damaged_compressed_message_is_named_and_the_others_are_read(tmp_path: Path) -> None:
