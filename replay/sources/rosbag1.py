@@ -126,14 +126,9 @@ class Rosbag1File(Closing):
         if is_ended or scan.is_cut:
             detail = f"the file ends early: {reason}"
             self.losses.add(Loss(SkipCause.ENDS_EARLY, f"byte {self._file.size}", detail, scan.lost_at_end))
-        elif self._lost_line_endings():
-            # any byte may be missing anywhere, and no checksum would tell
-            raise InputError(
-                f"{self.path}: {reason}, and the file holds not one CR LF, {TEXT_MODE}; if it was made like this, rebuild "
-                "the index of a copy with `rosbag reindex`"
-            )
         else:
-            self.losses.add(Loss(SkipCause.DAMAGED, "the index", f"{reason}; messages were found without it", 0))
+            cause = f"{reason}; the file holds not one CR LF, {TEXT_MODE}" if self._lost_line_endings() else reason
+            self.losses.add(Loss(SkipCause.DAMAGED, "the index", f"{cause}; messages were found without it", 0))
         return scan
 
     def _distrust_index(self, contents: Contents, misfit: _MisfitError) -> None:

@@ -52,7 +52,10 @@ class Rosbag2Folder(Closing):
             listed = listed_parts(path, self.losses)
             parts = listed or _parts_in(path)
             if not parts:
-                raise InputError(f"{path}: this ROS 2 bag has no file with messages; copy its .db3 or .mcap files here")
+                raise InputError(
+                    f"{path}: this ROS 2 bag has no file with messages, and its {METADATA} lists none; copy its .db3 or "
+                    ".mcap files here"
+                )
             self._parts = _opened_parts(parts, self.losses)
             if not listed:
                 name_gaps(parts, self.losses)
