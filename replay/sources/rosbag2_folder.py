@@ -53,7 +53,7 @@ class Rosbag2Folder(Closing):
             parts = listed or _parts_in(path)
             if not parts:
                 raise InputError(
-                    f"{path}: this ROS 2 bag has no file with messages, and its {METADATA} lists none; copy its .db3 or "
+                    f"{path}: this bag has no file with messages, and its {METADATA} lists none; copy its .db3 or "
                     ".mcap files here"
                 )
             self._parts = _opened_parts(parts, self.losses)
