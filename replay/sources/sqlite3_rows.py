@@ -178,8 +178,12 @@ class SalvagedTables:
         known = {row.get("id") for row in self._topics}
         self._leaves = self._pages.leaves(table.root, lambda cell: _is_message(table, cell, known))
         self._bad: set[int] = set()
+        self._doubtful_from: int | None = None
         self._found = self._collected({key for row in self._topics if (key := _used_topic(row)) is not None})
         missing = (header.pages or 0) - self._pages.count
+        if missing <= 0 and size % header.page_bytes:
+            detail = f"the file has {size} bytes, which are not whole pages of {header.page_bytes}: some are too many"
+            losses.add(Loss(SkipCause.DAMAGED, "the file", detail, 0))
         self._name_losses(f"byte {size}" if missing > 0 else "", f"{missing} of its {header.pages} pages are missing")
 
     def topics(self) -> list[Record]:
@@ -227,15 +231,19 @@ class SalvagedTables:
     def _collected(self, topic_ids: Collection[int]) -> _Found:
         """Return how many messages are there and, of these topics, where they are."""
         while True:
-            found, is_final = _Found(frozenset(topic_ids)), True
+            found, is_final, doubtful_from = _Found(frozenset(topic_ids)), True, self._doubtful_from
             for cell in self._pages.cells(self._leaves):
                 bad = self._pages.claim(cell) - self._bad
-                self._bad |= bad
                 # A row that was added may turn out to share a page with a later one.
                 is_final &= bad <= {cell.key}
+                if self._pages.reaches(cell, doubtful_from):
+                    bad.add(cell.key)
+                self._bad |= bad
                 if cell.key not in self._bad:
                     self._add(found, cell)
-            if is_final:
+            # Only when all pages have been given is it known where bytes may be missing.
+            self._doubtful_from = self._pages.doubtful_from()
+            if is_final and self._doubtful_from == doubtful_from:
                 found.rows.sort()
                 return found
 

@@ -127,6 +127,8 @@ class Pages:
         self._header = header
         # whose each page is: a row's key, or that of no row but of the tree
         self._owners = array("q", bytes(8 * (self.count + 1)))
+        self._may_be_displaced = size % header.page_bytes != 0
+        self._first_broken: int | None = None
 
     def tables(self) -> dict[str, Table]:
         """Return the tables by name.
@@ -176,18 +178,47 @@ class Pages:
     def claim(self, cell: Cell) -> set[int]:
         """Give a row its overflow pages; return the keys of rows that turn out not to be whole.
 
-        That is the row itself if a page is missing, and if it is another row's, that other one as well.
+        That is the row itself if a page is missing or comes twice, and if it is another row's, that other one as well.
         """
         bad: set[int] = set()
+        own: set[int] = set()
         try:
             for page in self._chain(cell):
                 owner = self._owners[page]
-                if owner not in {0, cell.key}:
+                if owner not in {0, cell.key} or page in own:
                     bad |= {cell.key, owner} - {_TREE}
+                own.add(page)
                 self._owners[page] = owner or cell.key
         except BadPageError:
             bad.add(cell.key)
         return bad
+
+    def doubtful_from(self) -> int | None:
+        """Return the first page in which bytes may be missing, or too many; None if there is none.
+
+        All pages behind such a place are displaced, so that it is in the last page that is sound, or before. To be
+        asked when all rows have their pages.
+        """
+        if self._first_broken is None or not self._may_be_displaced:
+            return None
+        suspect = self._first_broken - 1
+        while suspect > 1 and not self._owners[suspect]:
+            suspect -= 1
+        return suspect
+
+    def reaches(self, cell: Cell, page: int | None) -> bool:
+        """Tell whether any of a row is in a page, or behind it."""
+        if page is None:
+            return False
+        try:
+            return cell.start >= (page - 1) * self._header.page_bytes or any(each >= page for each in self._chain(cell))
+        except BadPageError:
+            return True
+
+    def _is_broken(self, page: int) -> None:
+        """Remember that what a page of the file says is wrong."""
+        if 1 <= page <= self.count:
+            self._first_broken = min(page, self._first_broken or page)
 
     def payload(self, cell: Cell) -> bytes:
         """Return the record of a row.
@@ -208,14 +239,22 @@ class Pages:
     def _chain(self, cell: Cell) -> Iterator[int]:
         """Yield the overflow pages of a row."""
         page, left = cell.overflow, cell.size - cell.local_bytes
+        holder = cell.start // self._header.page_bytes + 1
+        if left > self.count * self._header.usable_bytes:
+            raise BadPageError("it is larger than the file")
         while left > 0:
             if not 2 <= page <= self.count:
+                # that of a file that ends early is right all the same
+                if not self.count < page <= (self._header.pages or 0):
+                    self._is_broken(holder)
                 raise BadPageError(f"overflow page {page} is missing")
             yield page
             self._file.seek((page - 1) * self._header.page_bytes)
+            holder = page
             (page,) = struct.unpack(">I", self._file.read(4))
             left -= self._header.usable_bytes - 4
         if page:
+            self._is_broken(holder)
             raise BadPageError("its overflow pages go on after its end")
 
     def _page(self, number: int) -> bytes:
@@ -237,6 +276,7 @@ class Pages:
             else:
                 cells, children = [], _children(page, start, low, high)
         except (BadPageError, IndexError, struct.error):
+            self._is_broken(number)
             leaves.gaps.append(Gap(number, low, high))
             return
         self._owners[number] = _TREE
