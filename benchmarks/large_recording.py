@@ -38,7 +38,7 @@ SIDES: dict[Kind, int] = {"others": 800, "maps": 2000}
 CLOUD_TYPE, IMU_TYPE = "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/Imu"
 CLOUD_BYTES, IMU_BYTES = 1 << 20, 320
 CUT_AT = 0.97
-MOST_GROWTH = 1.1
+MOST_GROWTH = 1.2
 _UPDATES = 5
 TABLE = Table(24, ("recording", "size", "messages", "maps", "peak", "to a tenth", "wall"))
 

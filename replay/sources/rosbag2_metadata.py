@@ -98,7 +98,10 @@ def _metadata(path: Path) -> dict[str, Any]:
         return {}
     try:
         document = load_yaml(path)
-    except InputError:
+    except InputError as error:
+        # what cannot be opened at all, others may be able to open
+        if isinstance(error.__cause__, OSError):
+            raise
         return {}
     metadata = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
     return metadata if isinstance(metadata, dict) else {}

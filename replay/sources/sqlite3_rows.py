@@ -5,14 +5,17 @@ from __future__ import annotations
 import sqlite3
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
-from contextlib import suppress
+from dataclasses import dataclass, field
 from typing import BinaryIO, NamedTuple, Protocol
 
 from replay.skip_cause import SkipCause
+from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
 from replay.sources.losses import Loss, Losses
-from replay.sources.sqlite3_salvage import BadPageError, Cell, Gap, Header, Pages, Rows, Table, Value, record_of
+from replay.sources.sqlite3_salvage import BadPageError, Cell, Gap, Header, Leaves, Pages, Table, Value, record_of
+from replay.sources.topics import normalised_type
 from replay.words import counted
 
+_USED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 _TOPICS = "SELECT * FROM topics"
 _DEFINITIONS = "SELECT * FROM message_definitions"
 # The index on time may be damaged while the table is not.
@@ -120,6 +123,32 @@ class SqliteTables:
         return [dict(zip(names, row, strict=True)) for row in rows]
 
 
+@dataclass(slots=True)
+class _Found:
+    """The messages that are there.
+
+    Parameters
+    ----------
+    kept
+        Topics of which it is kept where the messages are; of the others, how many there are.
+    """
+
+    kept: frozenset[int]
+    counts: Counter[Value] = field(default_factory=Counter)
+    times_ns: tuple[int, int] | None = None
+    rows: list[Row] = field(default_factory=list)
+    cells: dict[int, Cell] = field(default_factory=dict)
+
+    def add(self, row: Row, cell: Cell) -> None:
+        """Take in a message."""
+        first_ns, last_ns = self.times_ns or (row.log_time_ns, row.log_time_ns)
+        self.times_ns = min(first_ns, row.log_time_ns), max(last_ns, row.log_time_ns)
+        self.counts[row.topic_id] += 1
+        if row.topic_id in self.kept:
+            self.rows.append(row)
+            self.cells[row.key] = cell
+
+
 class SalvagedTables:
     """The tables as far as they are there.
 
@@ -134,8 +163,6 @@ class SalvagedTables:
     def __init__(self, file: BinaryIO, size: int, header: Header, losses: Losses) -> None:
         self._pages = Pages(file, size, header)
         self._losses = losses
-        self._cells: dict[int, Cell] = {}
-        self._rows: list[Row] = []
         try:
             self._tables = self._pages.tables()
         except BadPageError as error:
@@ -147,8 +174,17 @@ class SalvagedTables:
         self._definitions = self._records("message_definitions") if "message_definitions" in self._tables else []
         if not self._topics:
             raise NoBagError("none of its topics is left")
+        table = self._tables["messages"]
+        known = {row.get("id") for row in self._topics}
+        self._leaves = self._pages.leaves(table.root, lambda cell: _is_message(table, cell, known))
+        self._bad: set[int] = set()
+        self._doubtful_from: int | None = None
+        self._found = self._collected({key for row in self._topics if (key := _used_topic(row)) is not None})
         missing = (header.pages or 0) - self._pages.count
-        self._find_messages(f"byte {size}" if missing > 0 else "", f"{missing} of its {header.pages} pages are missing")
+        if missing <= 0 and size % header.page_bytes:
+            detail = f"the file has {size} bytes, which are not whole pages of {header.page_bytes}: some are too many"
+            losses.add(Loss(SkipCause.DAMAGED, "the file", detail, 0))
+        self._name_losses(f"byte {size}" if missing > 0 else "", f"{missing} of its {header.pages} pages are missing")
 
     def topics(self) -> list[Record]:
         """Return the rows of ``topics`` that are there."""
@@ -160,21 +196,23 @@ class SalvagedTables:
 
     def counts(self) -> Mapping[Value, int]:
         """Return how many messages of each topic are there."""
-        return Counter(row.topic_id for row in self._rows)
+        return self._found.counts
 
     def times_ns(self) -> tuple[int, int] | None:
         """Return the times of the first and last message that are there."""
-        return (self._rows[0].log_time_ns, self._rows[-1].log_time_ns) if self._rows else None
+        return self._found.times_ns
 
     def rows(self, topic_ids: Collection[int]) -> Iterator[Row]:
         """Yield where the messages of these topics are, in order."""
-        return (row for row in self._rows if row.topic_id in topic_ids)
+        if not self._found.kept.issuperset(each for each in topic_ids if self._found.counts[each]):
+            self._found = self._collected(self._found.kept.union(topic_ids))
+        return (row for row in self._found.rows if row.topic_id in topic_ids)
 
     def data(self, row: Row) -> bytes:
         """Return the data of a message."""
         columns = self._tables["messages"].columns
         try:
-            data = record_of(self._pages.payload(self._cells[row.key]))[columns.index("data")]
+            data = record_of(self._pages.payload(self._found.cells[row.key]))[columns.index("data")]
         except (BadPageError, IndexError) as error:
             raise BadRowError(str(error)) from error
         if not isinstance(data, bytes):
@@ -183,36 +221,50 @@ class SalvagedTables:
 
     def _records(self, name: str) -> list[Record]:
         table = self._tables[name]
-        found = self._pages.rows(table.root)
-        for gap in found.gaps:
+        leaves = self._pages.leaves(table.root)
+        for gap in leaves.gaps:
             # what is beyond the end of the file is named as that
             if gap.page <= self._pages.count:
                 self._losses.add(_page_loss(gap, f"a part of the table '{name}'"))
-        return [_named(table, key, record) for key, record in self._pages.records(found.cells)]
+        return [_named(table, key, record) for key, record in self._pages.records(leaves)]
 
-    def _find_messages(self, cut: str, missing: str) -> None:
-        """Take in the messages that are there, and name what is lost."""
-        table = self._tables["messages"]
-        known = {row.get("id") for row in self._topics}
-        found = self._pages.rows(table.root, lambda cell: _is_message(table, cell, known))
-        whole = self._pages.whole(found.cells)
-        for cell in whole:
-            with suppress(BadPageError, KeyError):
-                row = _row(table, cell)
-                self._cells[cell.key] = cell
-                self._rows.append(row)
-        self._rows.sort()
-        lost = _lost(found, len(self._rows))
+    def _collected(self, topic_ids: Collection[int]) -> _Found:
+        """Return how many messages are there and, of these topics, where they are."""
+        while True:
+            found, is_final, doubtful_from = _Found(frozenset(topic_ids)), True, self._doubtful_from
+            for cell in self._pages.cells(self._leaves):
+                bad = self._pages.claim(cell) - self._bad
+                # A row that was added may turn out to share a page with a later one.
+                is_final &= bad <= {cell.key}
+                if self._pages.reaches(cell, doubtful_from):
+                    bad.add(cell.key)
+                self._bad |= bad
+                if cell.key not in self._bad:
+                    self._add(found, cell)
+            # Only when all pages have been given is it known where bytes may be missing.
+            self._doubtful_from = self._pages.doubtful_from()
+            if is_final and self._doubtful_from == doubtful_from:
+                found.rows.sort()
+                return found
+
+    def _add(self, found: _Found, cell: Cell) -> None:
+        try:
+            found.add(_row(self._tables["messages"], cell), cell)
+        except (BadPageError, KeyError):
+            self._bad.add(cell.key)
+
+    def _name_losses(self, cut: str, missing: str) -> None:
+        gaps, count = self._leaves.gaps, self._found.counts.total()
         if cut:
-            detail = f"the file ends early: {missing}; {counted(len(self._rows), 'message')} could be read"
-            self._losses.add(Loss(SkipCause.ENDS_EARLY, cut, detail, lost))
+            detail = f"the file ends early: {missing}; {counted(count, 'message')} could be read"
+            self._losses.add(Loss(SkipCause.ENDS_EARLY, cut, detail, _lost(self._leaves, count)))
             return
-        for gap in found.gaps:
+        for gap in gaps:
             self._losses.add(_page_loss(gap, "messages"))
-        for cell in found.cells:
-            if cell.key not in self._cells:
+        for key in sorted(self._bad):
+            if key > 0:
                 detail = "its pages are missing, another message's, or no message's"
-                self._losses.add(Loss(SkipCause.DAMAGED, f"message {cell.key}", detail, 1))
+                self._losses.add(Loss(SkipCause.DAMAGED, f"message {key}", detail, 1))
 
 
 def _named(table: Table, key: int, record: list[Value]) -> Record:
@@ -236,12 +288,18 @@ def _is_message(table: Table, cell: Cell, topic_ids: Collection[Value]) -> bool:
         return False
 
 
-def _lost(found: Rows, count: int) -> int | None:
+def _lost(leaves: Leaves, count: int) -> int | None:
     """Return how many messages are lost, as their keys are counted up from 1; None if the last one is not known."""
-    if any(gap.high is None for gap in found.gaps):
+    if any(gap.high is None for gap in leaves.gaps):
         return None
-    last = max([cell.key for cell in found.cells] + [gap.high or 0 for gap in found.gaps], default=0)
+    last = max([leaves.last_key] + [gap.high or 0 for gap in leaves.gaps])
     return max(0, last - count)
+
+
+def _used_topic(row: Record) -> int | None:
+    """Return the id of a topic whose messages may be asked for: of maps and transforms."""
+    key, msgtype = row.get("id"), row.get("type")
+    return key if isinstance(key, int) and normalised_type(str(msgtype)) in _USED_TYPES else None
 
 
 def _page_loss(gap: Gap, what: str) -> Loss:

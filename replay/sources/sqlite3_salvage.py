@@ -11,6 +11,7 @@ import re
 import sqlite3
 import struct
 from array import array
+from bisect import bisect, insort
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -98,11 +99,23 @@ class Table:
 
 
 @dataclass(slots=True)
-class Rows:
-    """The rows of a table that are there, in order of key, and what is not."""
+class Leaves:
+    """The pages with the rows of a table that are there, and what is not.
 
-    cells: list[Cell] = field(default_factory=list)
+    Attributes
+    ----------
+    last_key
+        The largest key of a row that is there; 0 if none is.
+    """
+
+    pages: array[int] = field(default_factory=lambda: array("Q"))
     gaps: list[Gap] = field(default_factory=list)
+    last_key: int = 0
+
+    def add(self, page: int, cells: Sequence[Cell]) -> None:
+        """Take in a page with its rows, which are not kept: a recording may have millions."""
+        self.pages.append(page)
+        self.last_key = max([self.last_key, *(cell.key for cell in cells)])
 
 
 class Pages:
@@ -114,6 +127,8 @@ class Pages:
         self._header = header
         # whose each page is: a row's key, or that of no row but of the tree
         self._owners = array("q", bytes(8 * (self.count + 1)))
+        self._may_be_displaced = size % header.page_bytes != 0
+        self._first_broken: int | None = None
 
     def tables(self) -> dict[str, Table]:
         """Return the tables by name.
@@ -123,17 +138,17 @@ class Pages:
         BadPageError
             If not all of them can be told.
         """
-        rows = self.rows(1)
-        if rows.gaps:
-            raise BadPageError(f"page {rows.gaps[0].page}, which lists the tables, is damaged or missing")
+        leaves = self.leaves(1)
+        if leaves.gaps:
+            raise BadPageError(f"page {leaves.gaps[0].page}, which lists the tables, is damaged or missing")
         tables = {}
-        for _, record in self.records(rows.cells):
+        for _, record in self.records(leaves):
             if len(record) == 5 and record[0] == "table" and isinstance(record[3], int):
                 tables[str(record[1])] = Table(record[3], _columns(str(record[4])))
         return tables
 
-    def rows(self, root: int, is_row: Callable[[Cell], bool] | None = None) -> Rows:
-        """Return the rows of the table whose first page this is.
+    def leaves(self, root: int, is_row: Callable[[Cell], bool] | None = None) -> Leaves:
+        """Return the pages with the rows of the table whose first page this is. It may be asked for once.
 
         Parameters
         ----------
@@ -141,34 +156,69 @@ class Pages:
             By which rows of this table are known from those of others, to find those of which the pages that point to
             them are lost; None not to look for them.
         """
-        rows = Rows()
-        self._walk(root, 0, None, rows, _DEEPEST)
-        if rows.gaps and is_row is not None:
-            self._find_orphans(rows, is_row)
-        rows.cells.sort(key=lambda cell: cell.key)
-        return rows
+        leaves = Leaves()
+        self._walk(root, 0, None, leaves, _DEEPEST)
+        if leaves.gaps and is_row is not None:
+            self._find_orphans(leaves, is_row)
+        return leaves
 
-    def records(self, cells: Sequence[Cell]) -> Iterator[tuple[int, list[Value]]]:
-        """Yield key and values of rows; those that are not whole are left out."""
-        for cell in cells:
+    def cells(self, leaves: Leaves) -> Iterator[Cell]:
+        """Yield the rows of a table that are there, those of a page at once."""
+        for number in leaves.pages:
+            yield from self._leaf(number, self._page(number), _HEADER_BYTES if number == 1 else 0, 0, None)
+
+    def records(self, leaves: Leaves) -> Iterator[tuple[int, list[Value]]]:
+        """Yield key and values of the rows of a table, in order of key; those that are not whole are left out."""
+        for cell in sorted(self.cells(leaves), key=lambda each: each.key):
             try:
                 yield cell.key, record_of(self.payload(cell))
             except BadPageError:
                 continue
 
-    def whole(self, cells: Sequence[Cell]) -> list[Cell]:
-        """Return the rows whose overflow pages are all there, and no other row's."""
-        bad = set()
-        for cell in cells:
-            try:
-                for page in self._chain(cell):
-                    owner = self._owners[page]
-                    if owner not in {0, cell.key}:
-                        bad |= {cell.key, owner}
-                    self._owners[page] = self._owners[page] or cell.key
-            except BadPageError:
-                bad.add(cell.key)
-        return [cell for cell in cells if cell.key not in bad]
+    def claim(self, cell: Cell) -> set[int]:
+        """Give a row its overflow pages; return the keys of rows that turn out not to be whole.
+
+        That is the row itself if a page is missing or comes twice, and if it is another row's, that other one as well.
+        """
+        bad: set[int] = set()
+        own: set[int] = set()
+        try:
+            for page in self._chain(cell):
+                owner = self._owners[page]
+                if owner not in {0, cell.key} or page in own:
+                    bad |= {cell.key, owner} - {_TREE}
+                own.add(page)
+                self._owners[page] = owner or cell.key
+        except BadPageError:
+            bad.add(cell.key)
+        return bad
+
+    def doubtful_from(self) -> int | None:
+        """Return the first page in which bytes may be missing, or too many; None if there is none.
+
+        All pages behind such a place are displaced, so that it is in the last page that is sound, or before. To be
+        asked when all rows have their pages.
+        """
+        if self._first_broken is None or not self._may_be_displaced:
+            return None
+        suspect = self._first_broken - 1
+        while suspect > 1 and not self._owners[suspect]:
+            suspect -= 1
+        return suspect
+
+    def reaches(self, cell: Cell, page: int | None) -> bool:
+        """Tell whether any of a row is in a page, or behind it."""
+        if page is None:
+            return False
+        try:
+            return cell.start >= (page - 1) * self._header.page_bytes or any(each >= page for each in self._chain(cell))
+        except BadPageError:
+            return True
+
+    def _is_broken(self, page: int) -> None:
+        """Remember that what a page of the file says is wrong."""
+        if 1 <= page <= self.count:
+            self._first_broken = min(page, self._first_broken or page)
 
     def payload(self, cell: Cell) -> bytes:
         """Return the record of a row.
@@ -189,14 +239,22 @@ class Pages:
     def _chain(self, cell: Cell) -> Iterator[int]:
         """Yield the overflow pages of a row."""
         page, left = cell.overflow, cell.size - cell.local_bytes
+        holder = cell.start // self._header.page_bytes + 1
+        if left > self.count * self._header.usable_bytes:
+            raise BadPageError("it is larger than the file")
         while left > 0:
             if not 2 <= page <= self.count:
+                # that of a file that ends early is right all the same
+                if not self.count < page <= (self._header.pages or 0):
+                    self._is_broken(holder)
                 raise BadPageError(f"overflow page {page} is missing")
             yield page
             self._file.seek((page - 1) * self._header.page_bytes)
+            holder = page
             (page,) = struct.unpack(">I", self._file.read(4))
             left -= self._header.usable_bytes - 4
         if page:
+            self._is_broken(holder)
             raise BadPageError("its overflow pages go on after its end")
 
     def _page(self, number: int) -> bytes:
@@ -205,7 +263,7 @@ class Pages:
         self._file.seek((number - 1) * self._header.page_bytes)
         return self._file.read(self._header.usable_bytes)
 
-    def _walk(self, number: int, low: int, high: int | None, rows: Rows, depth: int) -> None:
+    def _walk(self, number: int, low: int, high: int | None, leaves: Leaves, depth: int) -> None:
         """Take in the rows with keys above ``low`` and up to ``high`` that are at and below a page."""
         try:
             page = self._page(number)
@@ -218,12 +276,14 @@ class Pages:
             else:
                 cells, children = [], _children(page, start, low, high)
         except (BadPageError, IndexError, struct.error):
-            rows.gaps.append(Gap(number, low, high))
+            self._is_broken(number)
+            leaves.gaps.append(Gap(number, low, high))
             return
         self._owners[number] = _TREE
-        rows.cells += cells
+        if cells:
+            leaves.add(number, cells)
         for child, key in children:
-            self._walk(child, low, key, rows, depth - 1)
+            self._walk(child, low, key, leaves, depth - 1)
             low = key or low
 
     def _leaf(self, number: int, page: bytes, start: int, low: int, high: int | None) -> list[Cell]:
@@ -266,7 +326,7 @@ class Pages:
         fitting = least + (size - least) % (usable - 4)
         return fitting if fitting <= most else least
 
-    def _find_orphans(self, rows: Rows, is_row: Callable[[Cell], bool]) -> None:
+    def _find_orphans(self, leaves: Leaves, is_row: Callable[[Cell], bool]) -> None:
         """Take in rows of pages whose parent is lost.
 
         An overflow page is never taken for one: it begins with the number of a page, which is less than 2 ** 24 in any
@@ -274,7 +334,8 @@ class Pages:
         """
         if self.count >= _LEAF << 24:
             return
-        known = {cell.key for cell in rows.cells}
+        # first and last key of each page that was found, in order; the rows of no two pages of a table interleave
+        taken: list[tuple[int, int]] = []
         for number in range(2, self.count + 1):
             if self._owners[number]:
                 continue
@@ -283,17 +344,19 @@ class Pages:
                 cells = self._leaf(number, page, 0, 0, None) if page[0] == _LEAF else []
             except (BadPageError, IndexError, struct.error):
                 continue
-            if cells and all(map(is_row, cells)) and _belong(cells, rows, known):
+            if cells and all(map(is_row, cells)) and _belong(cells, leaves.gaps, taken):
                 self._owners[number] = _TREE
-                rows.cells += cells
-                known.update(cell.key for cell in cells)
+                leaves.add(number, cells)
+                insort(taken, (cells[0].key, cells[-1].key))
 
 
-def _belong(cells: Sequence[Cell], rows: Rows, known: set[int]) -> bool:
+def _belong(cells: Sequence[Cell], gaps: Sequence[Gap], taken: Sequence[tuple[int, int]]) -> bool:
     """Tell whether all these rows are among those that are lost."""
     first, last = cells[0].key, cells[-1].key
-    within = any(gap.low < first and (gap.high is None or last <= gap.high) for gap in rows.gaps)
-    return within and not any(cell.key in known for cell in cells)
+    within = any(gap.low < first and (gap.high is None or last <= gap.high) for gap in gaps)
+    place = bisect(taken, (first, first))
+    is_apart = (not place or taken[place - 1][1] < first) and (place == len(taken) or last < taken[place][0])
+    return within and is_apart
 
 
 def _children(page: bytes, start: int, low: int, high: int | None) -> list[tuple[int, int | None]]:

@@ -167,7 +167,7 @@ BOUNDARIES = {
         (),
         "a loss",
     ),
-    "folder, its metadata": Boundary("ruamel.yaml.YAML.load", _reading(*OPEN_FOLDER), ("yaml",), SYSTEM, "all is read"),
+    "folder, its metadata": Boundary("ruamel.yaml.YAML.load", _reading(*OPEN_FOLDER), ("yaml",), (), "all is read"),
     "folder, a part": Boundary(
         f"{ZSTD}.ZstdDecompressor", _reading(*OPEN_FOLDER, compression="file"), ("zstd",), SYSTEM, InputError
     ),

@@ -35,14 +35,20 @@ WALL = np.zeros((30, 40), np.uint8)
 
 
 @pytest.mark.parametrize(("text", "found"), HOSTILE_YAML.items())
-@pytest.mark.parametrize("name", ["map.yaml", "bag/metadata.yaml"])
-def test_yaml(tmp_path: Path, name: str, text: str, found: str) -> None:
-    path = tmp_path / name
-    path.parent.mkdir(exist_ok=True)
+def test_yaml(tmp_path: Path, text: str, found: str) -> None:
+    path = tmp_path / "map.yaml"
     path.write_text(text)
-    # a folder of which the metadata says nothing is told by its files, and there are none
-    is_map = name == "map.yaml"
-    refused(path if is_map else path.parent, path.name, found if is_map else "lists none")
+    refused(path, path.name, found)
+
+
+@pytest.mark.parametrize("text", HOSTILE_YAML)
+def test_metadata_that_cannot_be_used_is_as_good_as_none(tmp_path: Path, text: str) -> None:
+    bag = write_rosbag2(tmp_path / "bag", SAMPLE)
+    with open_source(bag) as source:
+        topics = source.info.topics
+    (bag / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  relative_file_paths: [a.db3]\n{text}")
+    with open_source(bag) as source:
+        assert source.info.topics == topics
 
 
 def test_yaml_of_any_size(tmp_path: Path) -> None:
