@@ -7,6 +7,7 @@ import heapq
 import re
 from collections.abc import Collection, Generator, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
+from dataclasses import replace
 from pathlib import Path, PureWindowsPath
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
@@ -49,7 +50,7 @@ class Rosbag2Folder(Closing):
         self.losses = Losses()
         with translated(path, _foreign()):
             listed = _listed_parts(path) if (path / METADATA).exists() else []
-            self._parts = [_FilePart(part) for part in listed or _parts_in(path)]
+            self._parts = [_FilePart(part, self.losses) for part in listed or _parts_in(path)]
             if not listed:
                 _check_that_they_belong_together(path, self._parts)
 
@@ -115,10 +116,17 @@ def merged_by_time(parts: Sequence[Part], topics: Collection[str]) -> Iterator[R
 
 
 class _FilePart:
-    """One file of a bag, open only while it is read."""
+    """One file of a bag, open only while it is read.
 
-    def __init__(self, path: Path) -> None:
+    Parameters
+    ----------
+    losses
+        Where what is lost of the file is named, with its name.
+    """
+
+    def __init__(self, path: Path, losses: Losses) -> None:
         self._path = path
+        self._losses = losses
         self._map_scan: Scan | None = None
         self._resources: set[ExitStack] = set()
         self._is_closed = False
@@ -156,10 +164,16 @@ class _FilePart:
             self._resources.add(stack)
             stack.callback(self._resources.discard, stack)
             try:
+                self._name_losses(source)
                 yield source
             finally:
+                self._name_losses(source)
                 if isinstance(source, McapFile):
                     self._map_scan = source.map_scan or self._map_scan
+
+    def _name_losses(self, source: Source) -> None:
+        for loss in source.losses.new():
+            self._losses.add(replace(loss, place=f"{loss.place} of {self.name}"))
 
     def _plain(self, stack: ExitStack) -> Path:
         """Return the file, or a decompressed copy that is there as long as the stack."""

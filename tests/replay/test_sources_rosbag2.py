@@ -10,6 +10,7 @@ from typing import Any, Literal
 import pytest
 
 from replay.errors import InputError
+from replay.skip_cause import SkipCause
 from replay.sources import mcap_file, open_source
 from replay.sources.base import RawMessage, SourceInfo
 from replay.sources.rosbag2_folder import merged_by_time
@@ -69,7 +70,26 @@ def test_damage_in_a_compressed_part_names_the_part_not_its_copy(tmp_path: Path)
     path = bags.write_rosbag2(tmp_path / "bag", storage="mcap", compression="file")
     (part,) = path.glob("*.zstd")
     part.write_bytes(zstd.compress(bags.write_mcap(tmp_path / "inner.mcap").read_bytes()[:5000]))
-    refused(path, str(part), "ends early at byte 5000")
+    with open_source(path) as source:
+        found = len(list(source.messages(TOPICS)))
+        assert 0 < found < len(bags.SAMPLE)
+        (loss,) = source.losses.all
+    assert loss.cause == SkipCause.ENDS_EARLY
+    assert loss.place.endswith(f" of {part.name}")
+
+
+def test_damage_that_shows_only_when_a_part_is_read_is_named_once(tmp_path: Path) -> None:
+    path = bags.write_rosbag2(tmp_path / "bag", storage="mcap")
+    (part,) = path.glob("*.mcap")
+    bags.write_mcap(part)
+    bags.damage(part, next(chunk for chunk in bags.chunks(part) if "/r1/map" in chunk.topics))
+    with open_source(path) as source:
+        assert source.losses.all == ()
+        for _ in range(2):
+            assert 0 < len(list(source.messages(["/r1/map"]))) < 3
+        (loss,) = source.losses.all
+    assert loss.place.startswith("the chunk at byte ")
+    assert loss.place.endswith(f" of {part.name}")
 
 
 def test_a_damaged_compressed_message(tmp_path: Path) -> None:
@@ -260,7 +280,7 @@ def test_parts_without_an_index_are_passed_through_once(
     passed: list[str] = []
     original = mcap_file.scan
     monkeypatch.setattr(
-        mcap_file, "scan", lambda file, wanted: (passed.append(file.path.name), original(file, wanted))[1]
+        mcap_file, "scan", lambda file, *rest: (passed.append(file.path.name), original(file, *rest))[1]
     )
     parts = [_part(tmp_path / f"{index}.mcap", index, index + 3, **options) for index in range(2)]
     with open_source(_bag(tmp_path / "bag", *parts)) as source:
