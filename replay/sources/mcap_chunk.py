@@ -68,6 +68,12 @@ def is_consistent(record: Record, content: bytes) -> bool:
     return head is not None and head.head_bytes + head.data_bytes == record.end - record.content
 
 
+def seems_a_chunk(record: Record, content: bytes) -> bool:
+    """Tell whether a record of another type says of itself what only chunks do, from how its content begins."""
+    head = chunk_head(content)
+    return head is not None and head.compression in _COMPRESSIONS and is_consistent(record, content)
+
+
 def chunk_content(file: RecordFile, start: int) -> tuple[bytes, bool]:
     """Return the records of the chunk at a byte of the file, and whether a checksum says that they are right.
 

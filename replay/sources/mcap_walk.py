@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from struct import Struct
 
-from replay.sources.mcap_chunk import CHUNK_HEAD_BYTES, is_consistent
+from replay.sources.mcap_chunk import CHUNK_HEAD_BYTES, is_consistent, seems_a_chunk
 from replay.sources.mcap_records import (
     ATTACHMENT,
     ATTACHMENT_INDEX,
@@ -112,6 +112,7 @@ class Walk:
         self._file = file
         self._chunk_starts = chunk_starts
         self._has_chunks = bool(chunk_starts)
+        self._has_header = False
         self._time_ns: int | None = None
         self._resumed: tuple[int, int | None] = (-1, None)
 
@@ -127,8 +128,9 @@ class Walk:
                 self._pass_over(start, resumed)
                 start = resumed
                 continue
-            if record.opcode not in _KNOWN and record.opcode < _PRIVATE and self.data_end is None:
+            if self.data_end is None and self._is_suspicious(record):
                 self.gaps.append(Gap(record.start, record.end, record.opcode))
+            self._has_header |= record.opcode == HEADER
             yield record
             start = record.end
             if record.opcode == DATA_END:
@@ -150,6 +152,9 @@ class Walk:
         if found is None or not self._file.is_whole(found[0]):
             return None
         record, head = found
+        if self.data_end is None and record.opcode not in {CHUNK, MESSAGE} and seems_a_chunk(record, head):
+            self._has_chunks = True
+            return None
         if record.opcode not in _KNOWN:
             return record if self._follows(record.end, after_unknown=True) else None
         if not self._is_plausible(record, head):
@@ -158,11 +163,38 @@ class Walk:
         self._has_chunks |= record.opcode in {CHUNK, MESSAGE_INDEX}
         if record.opcode not in _SURE and not self._follows(record.end):
             after = self._resume(record.end)
-            if after is not None and not self._begins_damaged(record, after):
+            if after is None:
+                # the end of the file, unless this record reaches over others
+                within = self._resume(record.start)
+                if within is not None and within < record.end:
+                    return None
+            elif not self._begins_damaged(record, after):
                 return None
         if record.opcode == MESSAGE:
             self._time_ns = message_header(head).log_time_ns
         return record
+
+    def _is_suspicious(self, record: Record) -> bool:
+        """Tell whether a record is of a type that there is not, or not here, or of a private one yet like messages."""
+        if record.opcode == HEADER:
+            return self._has_header
+        if record.opcode in _KNOWN or record.opcode < _PRIVATE:
+            return record.opcode not in _KNOWN
+        if record.end - record.content < MESSAGE_HEAD.size:
+            return False
+        time_ns = self._time_ns if self._time_ns is not None else self._next_time_ns(record.end)
+        return time_ns is not None and abs(self._file.message_header(record).log_time_ns - time_ns) < _NEAR_NS
+
+    def _next_time_ns(self, start: int) -> int | None:
+        """Return the time of the next message outside of chunks, if it is not far."""
+        for _ in range(_MOST_UNKNOWN):
+            found = self._file.head_at(start, MESSAGE_HEAD.size)
+            if found is None or not self._file.is_whole(found[0]):
+                return None
+            if found[0].opcode == MESSAGE and len(found[1]) == MESSAGE_HEAD.size:
+                return message_header(found[1]).log_time_ns
+            start = found[0].end
+        return None
 
     def _follows(self, start: int, *, after_unknown: bool = False) -> bool:
         """Tell whether a record begins where another one ends, or the file is at its end there."""
