@@ -195,7 +195,9 @@ class _Reading:
             if by_chunk and entry.chunk not in self._checked:
                 self._check(chunk, by_chunk.pop(entry.chunk))
             record = _message_at(chunk, entry)
-            if record is None or not (self._is_scanned or _is_followed(chunk, record)):
+            # Of a chunk without a problem all were checked.
+            is_sure = self._is_scanned or entry.chunk not in self._problems
+            if record is None or not (is_sure or _is_followed(chunk, record)):
                 # named with the chunk
                 continue
             topic = self._contents.topics[entry.connection]

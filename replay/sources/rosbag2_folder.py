@@ -2,43 +2,43 @@
 
 from __future__ import annotations
 
-import functools
 import heapq
 import re
 from collections.abc import Collection, Generator, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Protocol
+from typing import Protocol
 
 from replay.errors import InputError
+from replay.skip_cause import SkipCause
 from replay.sources.base import RawMessage, Source, SourceInfo
 from replay.sources.boundary import COMMON, Closing, translated
-from replay.sources.losses import Losses
+from replay.sources.losses import Loss, Losses
 from replay.sources.mcap_file import McapFile
 from replay.sources.mcap_scan import Scan
+from replay.sources.rosbag2_metadata import METADATA, listed_parts, name_gaps
 from replay.sources.sqlite3_file import Sqlite3File
 from replay.sources.topics import topic_table
 from replay.sources.zstd import MAGIC as ZSTD_MAGIC
 from replay.sources.zstd import ZstdError, decompress_file
 
-METADATA = "metadata.yaml"
 _MOST_OVERLAP_NS = 1_000_000_000
 
 _PART_SUFFIXES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 _HEAD_BYTES = 16
 
 
-@functools.cache
-def _foreign() -> tuple[type[Exception], ...]:
-    from ruamel.yaml.error import YAMLError
-
-    return (*COMMON, YAMLError, ZstdError)
+_FOREIGN = (*COMMON, ZstdError)
 
 
 class Rosbag2Folder(Closing):
     """A ROS 2 bag folder. Its parts are merged by time.
+
+    What is lost of a part is named with the part's name in front; a part that is missing or cannot be read at all is
+    left out and named, as long as there is another. Without metadata, or if it is damaged, all bag files of the folder
+    are its parts.
 
     A part is open, and decompressed into a temporary directory if it was compressed as a file, only while its contents
     are listed and while its messages are due: a bag may have more parts than files may be open, and be larger
@@ -48,10 +48,14 @@ class Rosbag2Folder(Closing):
     def __init__(self, path: Path) -> None:
         self.path = path
         self.losses = Losses()
-        with translated(path, _foreign()):
-            listed = _listed_parts(path) if (path / METADATA).exists() else []
-            self._parts = [_FilePart(part, self.losses) for part in listed or _parts_in(path)]
+        with translated(path, _FOREIGN):
+            listed = listed_parts(path, self.losses)
+            parts = listed or _parts_in(path)
+            if not parts:
+                raise InputError(f"{path}: this ROS 2 bag has no file with messages; copy its .db3 or .mcap files here")
+            self._parts = _opened_parts(parts, self.losses)
             if not listed:
+                name_gaps(parts, self.losses)
                 _check_that_they_belong_together(path, self._parts)
 
     @classmethod
@@ -116,13 +120,7 @@ def merged_by_time(parts: Sequence[Part], topics: Collection[str]) -> Iterator[R
 
 
 class _FilePart:
-    """One file of a bag, open only while it is read.
-
-    Parameters
-    ----------
-    losses
-        Where what is lost of the file is named, with its name.
-    """
+    """One file of a bag, open only while it is read."""
 
     def __init__(self, path: Path, losses: Losses) -> None:
         self._path = path
@@ -145,7 +143,9 @@ class _FilePart:
     def messages(self, topics: Collection[str]) -> Generator[RawMessage, None, None]:
         """Yield the messages of these topics in order of log time."""
         with self._opened() as source:
-            yield from source.messages(topics)
+            for message in source.messages(topics):
+                self._name_losses(source)
+                yield message
 
     def close(self) -> None:
         """Close the file and remove its copies, also those that are still being read."""
@@ -159,12 +159,15 @@ class _FilePart:
         if self._is_closed:
             raise ValueError(f"{self._path} is read after it was closed")
         with ExitStack() as stack:
-            with translated(self._path, _foreign()):
-                source = stack.enter_context(self._source(self._plain(stack)))
+            with translated(self._path, _FOREIGN):
+                plain, is_whole = self._plain(stack)
+                source = stack.enter_context(self._source(plain, is_whole=is_whole))
+                if not (is_whole or any(each.cause == SkipCause.ENDS_EARLY for each in source.losses.all)):
+                    detail = f"the file ends early at byte {self._path.stat().st_size}"
+                    source.losses.add(Loss(SkipCause.ENDS_EARLY, "its compression", detail))
             self._resources.add(stack)
             stack.callback(self._resources.discard, stack)
             try:
-                self._name_losses(source)
                 yield source
             finally:
                 self._name_losses(source)
@@ -173,26 +176,53 @@ class _FilePart:
 
     def _name_losses(self, source: Source) -> None:
         for loss in source.losses.new():
-            self._losses.add(replace(loss, place=f"{loss.place} of {self.name}"))
+            self._losses.add(replace(loss, place=f"{self.name}: {loss.place}"))
 
-    def _plain(self, stack: ExitStack) -> Path:
-        """Return the file, or a decompressed copy that is there as long as the stack."""
+    def _plain(self, stack: ExitStack) -> tuple[Path, bool]:
+        """Return the file, or a copy of what it decompresses to, there as long as the stack; whether it was whole."""
         if not _head(self._path).startswith(ZSTD_MAGIC):
-            return self._path
+            return self._path, True
         folder = Path(stack.enter_context(TemporaryDirectory(prefix="replay-")))
         plain = folder / self._path.name.removesuffix(".zstd")
-        decompress_file(self._path, plain)
-        return plain
+        return plain, decompress_file(self._path, plain)
 
-    def _source(self, plain: Path) -> Source:
+    def _source(self, plain: Path, *, is_whole: bool) -> Source:
         head = _head(plain)
         if McapFile.recognises(plain, head):
             return McapFile(plain, self._path, self._map_scan)
         if Sqlite3File.recognises(plain, head):
             return Sqlite3File(plain, self._path)
+        if not is_whole:
+            raise InputError(
+                f"{self._path}: the file ends early at byte {self._path.stat().st_size}, too early to decompress any "
+                "of it; copy it again from where it was made"
+            )
         raise InputError(
             f"{self._path}: this part of a ROS 2 bag is neither MCAP nor SQLite; copy it again from where it was made"
         )
+
+
+def _opened_parts(paths: Sequence[Path], losses: Losses) -> list[_FilePart]:
+    """Return the parts that can be read, and name the others.
+
+    Raises
+    ------
+    InputError
+        If none can be read, with what the first one said.
+    """
+    parts, errors = [], []
+    for path in paths:
+        try:
+            parts.append(_FilePart(path, losses))
+        except InputError as error:
+            if isinstance(error.__cause__, OSError):
+                # of the machine, not of the recording
+                raise
+            errors.append(error)
+            losses.add(Loss(SkipCause.DAMAGED, path.name, str(error).removeprefix(f"{path}: ")))
+    if not parts:
+        raise errors[0]
+    return parts
 
 
 def _check_that_they_belong_together(path: Path, parts: Sequence[_FilePart]) -> None:
@@ -224,50 +254,6 @@ def _parts_in(path: Path) -> list[Path]:
 
 def _natural(name: str) -> list[tuple[int, str]]:
     return [(int(digits or 0), text) for digits, text in re.findall(r"(\d*)(\D*)", name)]
-
-
-def _listed_parts(path: Path) -> list[Path]:
-    """Return the files that the metadata lists."""
-    metadata = _metadata(path / METADATA)
-    mode = str(metadata.get("compression_mode") or "none").lower()
-    kind = metadata.get("compression_format")
-    if mode != "none" and kind != "zstd":
-        raise InputError(
-            f"{path}: the bag is compressed with '{kind}'; zstd is read: convert it with `ros2 bag convert`"
-        )
-    # Before Foxy the names had the folder in front.
-    names = [PureWindowsPath(str(each)).name for each in metadata.get("relative_file_paths") or ()]
-    parts = [_present(path, name) for name in names]
-    missing = [name for name, part in zip(names, parts, strict=True) if part is None]
-    if missing:
-        raise InputError(
-            f"{path}: {len(missing)} of the {len(names)} parts that {METADATA} lists are missing: "
-            f"{', '.join(missing[:3])}{', …' if len(missing) > 3 else ''}; copy them here as well, or take them out of "
-            "the list"
-        )
-    return [part for part in parts if part is not None]
-
-
-def _present(path: Path, name: str) -> Path | None:
-    """Return the part of this name; a recorder that was stopped leaves a part that it has not compressed yet."""
-    for candidate in (path / name, path / name.removesuffix(".zstd"), path / f"{name}.zstd"):
-        if candidate.is_file():
-            return candidate
-    return None
-
-
-def _metadata(path: Path) -> dict[str, Any]:
-    from ruamel.yaml import YAML
-
-    with translated(path, _foreign()):
-        document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-    metadata = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
-    if not isinstance(metadata, dict):
-        raise InputError(
-            f"{path}: it has no 'rosbag2_bagfile_information'; expected the metadata of a ROS 2 bag: "
-            "rebuild it with `ros2 bag reindex`, or remove it to read all bag files of the folder"
-        )
-    return metadata
 
 
 def _head(path: Path) -> bytes:

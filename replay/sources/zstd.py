@@ -6,7 +6,6 @@ word.
 
 from __future__ import annotations
 
-import shutil
 import sys
 from pathlib import Path
 
@@ -17,13 +16,36 @@ else:
 
 MAGIC = b"\x28\xb5\x2f\xfd"
 
+_PIECE_BYTES = 1 << 20
+
 ZstdError = zstd.ZstdError
 
 
-def decompress_file(source: Path, target: Path) -> None:
-    """Decompress a file as a stream."""
-    with zstd.open(source, "rb") as compressed, target.open("wb") as plain:
-        shutil.copyfileobj(compressed, plain)
+def decompress_file(source: Path, target: Path) -> bool:
+    """Decompress a file as a stream.
+
+    Returns
+    -------
+    bool
+        Whether all of it was there; if not, the target has as much as what is there yields.
+
+    Raises
+    ------
+    ZstdError
+        If it is damaged: what follows, and some of what precedes the damage, is not what it was.
+    """
+    with source.open("rb") as compressed, target.open("wb") as plain:
+        decompressor = zstd.ZstdDecompressor()
+        piece = compressed.read(_PIECE_BYTES)
+        while piece or not (decompressor.needs_input or decompressor.eof):
+            plain.write(decompressor.decompress(piece, _PIECE_BYTES))
+            if decompressor.eof:
+                piece = decompressor.unused_data or compressed.read(_PIECE_BYTES)
+                # there may be several frames, one after the other
+                decompressor = zstd.ZstdDecompressor() if piece else decompressor
+            else:
+                piece = compressed.read(_PIECE_BYTES) if decompressor.needs_input else b""
+    return decompressor.eof
 
 
 def decompressed_cdr(data: bytes, most_bytes: int = 1 << 30) -> bytes:

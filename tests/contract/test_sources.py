@@ -16,7 +16,6 @@ import pytest
 from mapmerge.grid import Grid
 from mapmerge.sim2 import Sim2
 from replay.codec import decode
-from replay.errors import InputError
 from replay.messages import GridMessage, UpdateMessage
 from replay.sources import SOURCES, open_source
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, RawMessage
@@ -247,8 +246,6 @@ def test_the_name_of_a_file_does_not_matter(name: str, tmp_path: Path) -> None:
 
 CHUNKED = [name for name in FORMATS if name.endswith("-indexed") and "chunks" in name] + ["rosbag1-lz4", "rosbag1-bz2"]
 
-SALVAGED = [name for name in CHUNKED if name.startswith("mcap-")]
-
 
 @pytest.mark.parametrize("name", CHUNKED)
 def test_reads_only_the_chunks_that_hold_the_topics(name: str, tmp_path: Path) -> None:
@@ -258,16 +255,14 @@ def test_reads_only_the_chunks_that_hold_the_topics(name: str, tmp_path: Path) -
     for chunk in others:
         bags.damage(known.path, chunk)
     assert all(map(_matches, known.read(), known.expected()))
-    if name in SALVAGED:
-        with open_source(known.path) as source:
-            assert list(source.messages(["/chatter"])) == []
-            assert len(source.losses.all) == 3
-        return
-    with pytest.raises(InputError, match="the chunk at byte"):
-        known.read("/chatter")
+    with open_source(known.path) as source:
+        found = list(source.messages(["/chatter"]))
+        assert len(found) + len(source.losses.all) == 3
+        # The chunks that rosbags compresses with lz4 have no checksum, so that damage to some goes unseen.
+        assert found == [] or (name == "rosbag1-lz4" and source.losses.all)
 
 
-@pytest.mark.parametrize("name", SALVAGED)
+@pytest.mark.parametrize("name", [name for name in CHUNKED if name != "rosbag1-lz4"])
 def test_names_a_damaged_chunk_and_uses_all_others(name: str, tmp_path: Path) -> None:
     known = Bag(FORMATS[name].write(tmp_path), FORMATS[name])
     whole = known.read()
@@ -280,17 +275,6 @@ def test_names_a_damaged_chunk_and_uses_all_others(name: str, tmp_path: Path) ->
     assert loss.messages is not None
     assert [each for each in whole if each in found] == found
     assert len(found) == len(whole) - loss.messages
-
-
-# The chunks that rosbags compresses with lz4 have no checksum, so that damage to them may go unseen.
-@pytest.mark.parametrize("name", [name for name in CHUNKED if name not in {"rosbag1-lz4", *SALVAGED}])
-def test_refuses_a_damaged_chunk_that_holds_the_topics(name: str, tmp_path: Path) -> None:
-    known = Bag(FORMATS[name].write(tmp_path), FORMATS[name])
-    bags.damage(known.path, next(chunk for chunk in bags.chunks(known.path) if "/r1/map" in chunk.topics))
-    with pytest.raises(InputError, match="the chunk at byte") as caught:
-        known.read()
-    assert str(caught.value).startswith(str(known.path))
-    assert "\n" not in str(caught.value)
 
 
 def test_opencv_writes_what_the_saved_map_says() -> None:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
-from collections.abc import Collection, Generator
+from collections.abc import Collection, Generator, Iterable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -31,10 +31,83 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def test_a_missing_part_is_named(tmp_path: Path) -> None:
+def _read(path: Path) -> tuple[list[tuple[str, int, bytes]], list[tuple[str, str, int | None]]]:
+    """Return all messages of a bag, and cause, place and number of messages of what is lost, each time it is read."""
+    with open_source(path) as source:
+        topics = [each.name for each in source.info.topics]
+        found = [(each.topic, each.log_time_ns, bytes(each.data)) for each in source.messages(topics)]
+        losses = source.losses.all
+        assert len(list(source.messages(topics))) == len(found)
+        assert source.losses.all == losses
+    return found, [(str(each.cause), each.place, each.messages) for each in losses]
+
+
+def _recorded(messages: Iterable[bags.Recorded]) -> list[tuple[str, int, bytes]]:
+    ordered = sorted(messages, key=lambda each: each.log_time_ns)
+    return [(each.topic, each.log_time_ns, bags.as_cdr(each)) for each in ordered]
+
+
+def _without(index: int) -> list[bags.Recorded]:
+    return [each for at, each in enumerate(bags.SAMPLE) if at != index]
+
+
+@pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
+def test_a_missing_part_is_named_and_the_others_are_read(tmp_path: Path, storage: Literal["sqlite3", "mcap"]) -> None:
+    path = bags.write_split_rosbag2(tmp_path / "bag", storage=storage)
+    (missing,) = path.glob("bag_7.*")
+    missing.unlink()
+    assert _read(path) == (_recorded(_without(2)), [("missing_part", missing.name, None)])
+
+
+def test_the_metadata_says_how_many_messages_are_missing(tmp_path: Path) -> None:
     path = bags.write_split_rosbag2(tmp_path / "bag")
     (path / "bag_7.db3").unlink()
-    refused(path, "1 of the 10 parts", "bag_7.db3", "metadata.yaml")
+    with (path / "metadata.yaml").open("a") as file:
+        file.write("  files:\n  - path: bag_7.db3\n    message_count: 41\n")
+    assert _read(path)[1] == [("missing_part", "bag_7.db3", 41)]
+
+
+def test_all_parts_are_missing(tmp_path: Path) -> None:
+    path = bags.write_split_rosbag2(tmp_path / "bag", bags.SAMPLE[:4])
+    for part in path.glob("*.db3"):
+        part.unlink()
+    refused(path, "all 4 parts", "bag_5.db3", "metadata.yaml")
+
+
+def test_a_part_that_is_listed_twice_is_read_once(tmp_path: Path) -> None:
+    path = bags.write_split_rosbag2(tmp_path / "bag")
+    metadata = path / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace("  - bag/bag_7.db3\n", "  - bag/bag_7.db3\n" * 2))
+    assert _read(path) == (_recorded(bags.SAMPLE), [])
+
+
+def test_a_gap_in_the_numbers_of_parts_that_nothing_lists_is_named(tmp_path: Path) -> None:
+    path = bags.write_split_rosbag2(tmp_path / "bag")
+    (path / "metadata.yaml").unlink()
+    (path / "bag_7.db3").unlink()
+    assert _read(path) == (_recorded(_without(2)), [("missing_part", "bag_7.db3", None)])
+
+
+@pytest.mark.parametrize(
+    "names", [("day_1.mcap", "day_900.mcap"), ("day_01.mcap", "day_03.mcap"), ("a.mcap", "c.mcap")]
+)
+def test_other_numbers_are_no_numbers_of_parts(tmp_path: Path, names: tuple[str, str]) -> None:
+    (tmp_path / "run").mkdir()
+    for index, name in enumerate(names):
+        _part(tmp_path / "run" / name, index)
+    assert _read(tmp_path / "run")[1] == []
+
+
+@pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
+def test_what_is_lost_of_a_part_is_named_with_the_part(tmp_path: Path, storage: Literal["sqlite3", "mcap"]) -> None:
+    path = bags.write_split_rosbag2(tmp_path / "bag", storage=storage)
+    (part,) = path.glob("bag_6.*")
+    length = part.stat().st_size - 4096
+    part.write_bytes(part.read_bytes()[:length])
+    found, losses = _read(path)
+    assert found == _recorded(_without(1)) or found == _recorded(bags.SAMPLE)
+    assert {cause for cause, _, _ in losses} == {"ends_early"}
+    assert all(place.startswith(f"{part.name}: ") for _, place, _ in losses)
 
 
 def test_a_part_that_is_not_compressed_yet(tmp_path: Path, temporary: Path) -> None:
@@ -58,11 +131,46 @@ def test_without_metadata_a_part_and_its_compressed_copy_count_once(tmp_path: Pa
 
 
 @pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
-def test_a_truncated_compressed_part_leaves_no_copy(tmp_path: Path, temporary: Path, storage: str) -> None:
+def test_of_a_truncated_compressed_part_is_read_what_it_yields(
+    tmp_path: Path, temporary: Path, storage: Literal["sqlite3", "mcap"]
+) -> None:
+    messages = [bags.recorded_map("/r1/map", START + each * SECOND, seed=each, rows=4000) for each in range(4)]
+    path = bags.write_rosbag2(tmp_path / "bag", messages, storage, "file")
+    (part,) = path.glob("*.zstd")
+    part.write_bytes(part.read_bytes()[: part.stat().st_size * 7 // 10])
+    found, losses = _read(path)
+    assert found == _recorded(messages[:2])
+    assert [cause for cause, _, _ in losses] == ["ends_early"]
+    assert losses[0][1].startswith(f"{part.name}: ")
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_compressed_part_that_lost_only_its_last_bytes(tmp_path: Path, temporary: Path) -> None:
+    path = bags.write_rosbag2(tmp_path / "bag", compression="file")
+    (part,) = path.glob("*.zstd")
+    plain = zstd.decompress(part.read_bytes())
+    part.write_bytes(zstd.compress(plain, options={zstd.CompressionParameter.checksum_flag: 1})[:-2])
+    assert _read(path) == (_recorded(bags.SAMPLE), [("ends_early", f"{part.name}: its compression", None)])
+    assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
+def test_a_compressed_part_that_yields_nothing(tmp_path: Path, temporary: Path, storage: str) -> None:
     path = bags.write_rosbag2(tmp_path / "bag", storage=storage, compression="file")
     (part,) = path.glob("*.zstd")
     part.write_bytes(part.read_bytes()[:-20])
-    refused(path, str(part), "ended before")
+    refused(path, str(part), "ends early", "decompress")
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_compressed_part_that_is_damaged_is_left_out(tmp_path: Path, temporary: Path) -> None:
+    path = bags.write_split_rosbag2(tmp_path / "bag", compression="file")
+    part = path / "bag_7.db3.zstd"
+    plain = zstd.decompress(part.read_bytes())
+    data = bytearray(zstd.compress(plain, options={zstd.CompressionParameter.checksum_flag: 1}))
+    data[-1] ^= 1
+    part.write_bytes(data)
+    assert _read(path) == (_recorded(_without(2)), [("damaged", part.name, None)])
     assert list(temporary.iterdir()) == []
 
 
@@ -75,7 +183,7 @@ def test_damage_in_a_compressed_part_names_the_part_not_its_copy(tmp_path: Path)
         assert 0 < found < len(bags.SAMPLE)
         (loss,) = source.losses.all
     assert loss.cause == SkipCause.ENDS_EARLY
-    assert loss.place.endswith(f" of {part.name}")
+    assert loss.place.startswith(f"{part.name}: ")
 
 
 def test_damage_that_shows_only_when_a_part_is_read_is_named_once(tmp_path: Path) -> None:
@@ -88,18 +196,22 @@ def test_damage_that_shows_only_when_a_part_is_read_is_named_once(tmp_path: Path
         for _ in range(2):
             assert 0 < len(list(source.messages(["/r1/map"]))) < 3
         (loss,) = source.losses.all
-    assert loss.place.startswith("the chunk at byte ")
-    assert loss.place.endswith(f" of {part.name}")
+    assert loss.place.startswith(f"{part.name}: the chunk at byte ")
 
 
-def test_a_damaged_compressed_message(tmp_path: Path) -> None:
-    path = bags.write_rosbag2(tmp_path / "bag", bags.SAMPLE[1:2], compression="message")
+def test_a_damaged_compressed_message_is_named_and_the_others_are_read(tmp_path: Path) -> None:
+    path = bags.write_rosbag2(tmp_path / "bag", bags.SAMPLE[1:4], compression="message")
     (part,) = path.glob("*.db3")
     data = bytearray(part.read_bytes())
     start = data.index(MAGIC) + len(MAGIC)
     data[start : start + 20] = b"\xff" * 20
     part.write_bytes(data)
-    refused(path, str(part), "ZstdError")
+    found, losses = _read(path)
+    lost = set(_recorded(bags.SAMPLE[1:4])) - set(found)
+    assert len(lost) == 1
+    assert found == [each for each in _recorded(bags.SAMPLE[1:4]) if each not in lost]
+    assert [(cause, count) for cause, _, count in losses] == [("damaged", 1)]
+    assert losses[0][1].startswith(f"{part.name}: message ")
 
 
 def test_another_compression(tmp_path: Path) -> None:
@@ -109,17 +221,27 @@ def test_another_compression(tmp_path: Path) -> None:
     refused(path, "'lz4'", "zstd", "ros2 bag convert")
 
 
-@pytest.mark.parametrize(
-    ("text", "word"),
-    [("", "rosbag2_bagfile_information"), ("a: [", "cannot be read"), ("- 1", "rosbag2_bagfile_information")],
-)
-def test_metadata_that_is_none(tmp_path: Path, text: str, word: str) -> None:
-    path = bags.write_rosbag2(tmp_path / "bag")
-    (path / "metadata.yaml").write_text(text)
-    refused(path, str(path / "metadata.yaml"), word)
+@pytest.mark.parametrize("text", ["", "a: [", "- 1", "rosbag2_bagfile_information: 3", "\x00", "\xff\xfe"])
+def test_metadata_that_is_none_says_no_more_than_the_files(tmp_path: Path, text: str) -> None:
+    path = bags.write_split_rosbag2(tmp_path / "bag")
+    (path / "metadata.yaml").write_bytes(text.encode("latin-1"))
+    assert _read(path) == (_recorded(bags.SAMPLE), [])
 
 
-def test_a_part_that_is_no_recording(tmp_path: Path) -> None:
+def test_metadata_without_any_file(tmp_path: Path) -> None:
+    path = tmp_path / "bag"
+    path.mkdir()
+    (path / "metadata.yaml").touch()
+    refused(path, "no file with messages")
+
+
+def test_a_part_that_is_no_recording_is_left_out(tmp_path: Path) -> None:
+    path = bags.write_split_rosbag2(tmp_path / "bag")
+    (path / "bag_7.db3").write_bytes(b"something else")
+    assert _read(path) == (_recorded(_without(2)), [("damaged", "bag_7.db3", None)])
+
+
+def test_the_only_part_is_no_recording(tmp_path: Path) -> None:
     path = bags.write_rosbag2(tmp_path / "bag")
     (path / "bag.db3").write_bytes(b"something else")
     refused(path, str(path / "bag.db3"), "neither MCAP nor SQLite")
@@ -128,7 +250,7 @@ def test_a_part_that_is_no_recording(tmp_path: Path) -> None:
 def test_a_wal_beside_a_part(tmp_path: Path) -> None:
     path = bags.write_rosbag2(tmp_path / "bag")
     (path / "bag.db3-wal").write_bytes(b"rows")
-    refused(path, "bag.db3-wal")
+    assert _read(path) == (_recorded(bags.SAMPLE), [("damaged", "bag.db3: bag.db3-wal", None)])
 
 
 def test_the_metadata_itself_points_to_its_folder(tmp_path: Path) -> None:
@@ -245,7 +367,7 @@ def test_no_copy_stays_when_a_part_is_damaged(tmp_path: Path, temporary: Path) -
     with open_source(path) as source:
         part = path / "part_2.mcap.zstd"
         part.write_bytes(part.read_bytes()[:-20])
-        with pytest.raises(InputError, match="ended before") as caught:
+        with pytest.raises(InputError, match="ends early") as caught:
             list(source.messages(["/r1/map"]))
         assert str(caught.value).startswith(str(part))
         assert list(temporary.iterdir()) == []

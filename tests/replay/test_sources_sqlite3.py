@@ -269,7 +269,8 @@ def test_of_a_truncated_file_every_message_is_read_whose_pages_are_there(tmp_pat
         assert [(str(each.cause), each.place) for each in losses] == [("ends_early", f"byte {length}")]
         assert losses[0].messages in {None, len(messages) - len(found)}
         counts.add(len(found))
-    assert counts == set(range(len(messages)))
+    # the smallest message lies in one page with another's end
+    assert counts == set(range(len(messages))) - {3}
 
 
 def test_of_a_long_truncated_file_rows_are_found_though_what_points_to_their_pages_is_lost(tmp_path: Path) -> None:

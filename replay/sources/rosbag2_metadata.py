@@ -1,0 +1,107 @@
+"""``metadata.yaml`` of ROS 2 bag folders: which files are the parts of a recording."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PureWindowsPath
+from typing import Any
+
+from replay.errors import InputError
+from replay.skip_cause import SkipCause
+from replay.sources.losses import Loss, Losses
+
+METADATA = "metadata.yaml"
+
+# as recorders number parts: without leading zeros
+_NUMBERED = re.compile(r"(.*)_(0|[1-9]\d{0,4})((?:\.[a-z0-9]+)+)")
+
+
+def listed_parts(path: Path, losses: Losses) -> list[Path]:
+    """Return the files that the metadata of a bag lists, and name those that are missing.
+
+    Returns
+    -------
+    list of Path
+        Empty if there is no metadata, or none that lists files: then it says nothing of the recording that its files
+        do not say themselves.
+
+    Raises
+    ------
+    InputError
+        If all files that it lists are missing, or their compression is not read.
+    """
+    metadata = _metadata(path / METADATA)
+    mode = str(metadata.get("compression_mode") or "none").lower()
+    kind = metadata.get("compression_format")
+    if mode != "none" and kind != "zstd":
+        raise InputError(
+            f"{path}: the bag is compressed with '{kind}'; zstd is read: convert it with `ros2 bag convert`"
+        )
+    listed = metadata.get("relative_file_paths")
+    # Before Foxy the names had the folder in front.
+    names = dict.fromkeys(PureWindowsPath(str(each)).name for each in listed) if isinstance(listed, list) else {}
+    found = {name: _present(path, name) for name in names}
+    missing = [name for name, part in found.items() if part is None]
+    if names and len(missing) == len(names):
+        shown = f"{', '.join(missing[:3])}{', …' if len(missing) > 3 else ''}"
+        raise InputError(
+            f"{path}: all {len(names)} parts that {METADATA} lists are missing: {shown}; copy them here as well"
+        )
+    counts = _message_counts(metadata)
+    for name in missing:
+        detail = f"{METADATA} lists it, and it is not there: copy it here as well"
+        losses.add(Loss(SkipCause.MISSING_PART, name, detail, counts.get(name)))
+    return list(dict.fromkeys(part for part in found.values() if part is not None))
+
+
+def name_gaps(parts: Sequence[Path], losses: Losses) -> None:
+    """Name parts that are missing as their numbers tell, where nothing lists them.
+
+    Files with numbers far apart are not numbered as parts.
+    """
+    numbers: dict[tuple[str, str], list[int]] = {}
+    for part in parts:
+        match = _NUMBERED.fullmatch(part.name)
+        if match:
+            numbers.setdefault((match[1], match[3]), []).append(int(match[2]))
+    for (stem, suffix), present in numbers.items():
+        missing = sorted(set(range(min(present), max(present))) - set(present))
+        if len(missing) < len(present):
+            for number in missing:
+                detail = "parts before and after it are there: copy it here as well"
+                losses.add(Loss(SkipCause.MISSING_PART, f"{stem}_{number}{suffix}", detail))
+
+
+def _present(path: Path, name: str) -> Path | None:
+    """Return the part of this name; a recorder that was stopped leaves a part that it has not compressed yet."""
+    for candidate in (path / name, path / name.removesuffix(".zstd"), path / f"{name}.zstd"):
+        if name and candidate.is_file():
+            return candidate
+    return None
+
+
+def _message_counts(metadata: Mapping[str, Any]) -> dict[str, int]:
+    """Return how many messages each part has, where the metadata says so."""
+    files = metadata.get("files")
+    counts = {}
+    for each in files if isinstance(files, list) else ():
+        if isinstance(each, dict) and isinstance(each.get("message_count"), int):
+            counts[PureWindowsPath(str(each.get("path"))).name] = each["message_count"]
+    return counts
+
+
+def _metadata(path: Path) -> dict[str, Any]:
+    """Return what the metadata says; nothing if it is not there, damaged, or that of something else."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    if not path.exists():
+        return {}
+    try:
+        document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    # a text that is no YAML fails the parser in any of these ways
+    except (YAMLError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return {}
+    metadata = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
+    return metadata if isinstance(metadata, dict) else {}
