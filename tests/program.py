@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from replay.cli import main
+from replay.interrupts import NUMBERS
 
 PROGRAM = (sys.executable, "-m", "replay.cli")
 
@@ -68,14 +69,15 @@ class Program:
         self.folder = folder
 
     def __call__(self, *arguments: object) -> Ran:
-        handler = signal.getsignal(signal.SIGTERM)
+        handlers = {number: signal.getsignal(number) for number in NUMBERS}
         self._capsys.readouterr()
         try:
             status = main([str(each) for each in arguments])
         except SystemExit as stop:
             status = int(stop.code or 0)
         finally:
-            signal.signal(signal.SIGTERM, handler)
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
         said = self._capsys.readouterr()
         return Ran(status, said.out, said.err, self.folder / "out.mcap")
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import BinaryIO, Self
 
 from replay.errors import OutputError
+from replay.interrupts import put_off
 from replay.sinks.file_lock import try_lock
 
 # Windows neither renames nor removes a file that is open.
@@ -55,14 +56,14 @@ class PartialFile:
         return file
 
     def claim(self) -> None:
-        """Make the file, empty and locked, under its temporary name.
+        """Make the file, empty and locked, under its temporary name; interrupts wait, so that it is known to be there.
 
         Raises
         ------
         OutputError
             If another run is writing it, or it cannot be made.
         """
-        with output_errors(self.path):
+        with put_off(), output_errors(self.path):
             for _ in range(_ATTEMPTS):
                 self._remove_left_over()
                 if self._make():

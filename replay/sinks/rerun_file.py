@@ -31,13 +31,15 @@ class RerunSink:
 
     def __init__(self, file: PartialFile, _options: OutputOptions) -> None:
         self._file = file
+        self._stream: RrdStream | None = None
         self._writer: _Writer | None = None
 
     def take(self, event: Event) -> None:
         """Log what happened; the library writes it to the file in the meantime."""
         with rerun_errors(self._file.path):
             if isinstance(event, Started):
-                self._writer = _Writer(self._file, event)
+                self._stream = RrdStream(self._file, _recording_id(event))
+                self._writer = _Writer(self._stream, event)
             elif self._writer is not None:
                 self._writer.take(event)
 
@@ -55,18 +57,18 @@ class RerunSink:
     def discard(self) -> None:
         """Remove the recording."""
         with suppress(OutputError), rerun_errors(self._file.path):
-            if self._writer is not None:
-                self._writer.stream.close()
+            if self._stream is not None:
+                self._stream.close()
         self._file.discard()
 
 
 class _Writer:
     """Logs a run whose robots are known."""
 
-    def __init__(self, file: PartialFile, started: Started) -> None:
+    def __init__(self, stream: RrdStream, started: Started) -> None:
         merge = started.settings["merge"]
         robots = [RobotEntities(item.robot, index) for index, item in enumerate(started.robots)]
-        self.stream = RrdStream(file, _recording_id(started))
+        self.stream = stream
         self._robots = {entities.robot: entities for entities in robots}
         self._maps = MapScene(self.stream, robots, CellConfig(**merge["cells"]))
         limit_of = "confidence" if merge["method"] in CALIBRATED else "acceptance"

@@ -64,8 +64,10 @@ class RrdStream:
         self._outlet = outlet_to(file)
         try:
             self._recording.save(self._outlet.path)
-        finally:
-            self._outlet.opened()
+        except BaseException:
+            self.close()
+            raise
+        self._outlet.opened()
 
     def at(self, stamp_ns: int) -> None:
         """Set the time of what is logged from now on."""

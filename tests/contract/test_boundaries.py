@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -206,6 +207,7 @@ def test_is_an_error_of_ours_in_one_line(
     assert str(caught.value)
     assert "\n" not in str(caught.value)
     assert caught.value.__cause__ is not None
+    assert not [each.name for each in threading.enumerate() if each.name == "rrd"]
     assert not [each.name for each in tmp_path.iterdir() if each.name.startswith("out.")]
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from replay.interrupts import NUMBERS
 from replay.sinks.partial_file import PartialFile
 from tests.bags import write_mcap
 from tests.program import PROGRAM, Program, quiet, started, wait_for
@@ -16,9 +19,6 @@ from tests.runs import flat_map, seen
 # A shell shows 130 for both. Python ends itself with the signal, whatever the program returns, if it was running code
 # that is made at run time, such as a dataclass.
 INTERRUPTED = (130, -signal.SIGINT)
-
-
-NUMBERS = [signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +74,25 @@ def test_what_is_ignored_stays_ignored(two: Path, tmp_path: Path) -> None:
     process.communicate(timeout=30)
     assert process.returncode == 0
     assert (tmp_path / "out.json").exists()
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_while_a_file_is_made_it_is_known_to_be_there(
+    replay: Program, two: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    make = os.open
+
+    def interrupted(path: Any, flags: int, *more: int) -> int:
+        made = make(path, flags, *more)
+        if str(path).endswith("out.json.partial"):
+            signal.raise_signal(number)
+        return made
+
+    monkeypatch.setattr(os, "open", interrupted)
+    ran = replay.merge(two)
+    assert ran.status == 130
+    assert ran.err.splitlines()[-1] == "replay: interrupted; nothing was written"
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("number", NUMBERS)
