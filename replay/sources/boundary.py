@@ -37,7 +37,7 @@ TEXT_MODE = (
 _LIMITS = {
     errno.EMFILE: "raise the limit (`ulimit -n`), or give fewer recordings at once",
     errno.ENFILE: "close other programs, or raise the limit of the system",
-    # Only decompressed copies are written.
+    # Only temporary copies are written: decompressed, or with what was beside them.
     errno.ENOSPC: "free space in the temporary folder, or name another in the environment variable TMPDIR",
 }
 

@@ -108,7 +108,7 @@ class Sqlite3File(Closing):
             check_journal(self._plain, found[JOURNAL], self.path, self.losses)
         if found:
             self._plain = copied(self._plain, found, stack)
-        elif self._is_short():
+        elif not self._has_its_pages():
             return self._salvaged(stack)
         try:
             database = stack.enter_context(closing(_connected(self._plain, is_copy=bool(found))))
@@ -124,11 +124,12 @@ class Sqlite3File(Closing):
             return self._salvaged(stack)
         return tables
 
-    def _is_short(self) -> bool:
-        """Tell whether the file has fewer pages than its header says, which SQLite would not mention."""
+    def _has_its_pages(self) -> bool:
+        """Tell whether the file has all pages that its header says, and only whole ones: SQLite does not mention it."""
         with self._plain.open("rb") as file:
             header = read_header(file)
-        return header is None or self._plain.stat().st_size < (header.pages or 0) * header.page_bytes
+        size = self._plain.stat().st_size
+        return header is not None and size % header.page_bytes == 0 and size >= (header.pages or 0) * header.page_bytes
 
     def _salvaged(self, stack: ExitStack) -> SalvagedTables:
         file = stack.enter_context(self._plain.open("rb"))

@@ -148,6 +148,9 @@ class SalvagedTables:
         if not self._topics:
             raise NoBagError("none of its topics is left")
         missing = (header.pages or 0) - self._pages.count
+        if missing <= 0 and size % header.page_bytes:
+            detail = f"the file has {size} bytes, which are not whole pages of {header.page_bytes}: some are too many"
+            losses.add(Loss(SkipCause.DAMAGED, "the file", detail, 0))
         self._find_messages(f"byte {size}" if missing > 0 else "", f"{missing} of its {header.pages} pages are missing")
 
     def topics(self) -> list[Record]:

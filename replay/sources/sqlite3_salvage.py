@@ -114,6 +114,8 @@ class Pages:
         self._header = header
         # whose each page is: a row's key, or that of no row but of the tree
         self._owners = array("q", bytes(8 * (self.count + 1)))
+        self._may_be_displaced = size % header.page_bytes != 0
+        self._first_broken: int | None = None
 
     def tables(self) -> dict[str, Table]:
         """Return the tables by name.
@@ -160,15 +162,37 @@ class Pages:
         """Return the rows whose overflow pages are all there, and no other row's."""
         bad = set()
         for cell in cells:
+            own = set()
             try:
                 for page in self._chain(cell):
                     owner = self._owners[page]
-                    if owner not in {0, cell.key}:
+                    if owner not in {0, cell.key} or page in own:
                         bad |= {cell.key, owner}
-                    self._owners[page] = self._owners[page] or cell.key
+                    own.add(page)
+                    self._owners[page] = owner or cell.key
             except BadPageError:
                 bad.add(cell.key)
+        bad |= self._displaced(cells)
         return [cell for cell in cells if cell.key not in bad]
+
+    def _displaced(self, cells: Sequence[Cell]) -> set[int]:
+        """Return the rows that bytes may be missing of, or have been added to.
+
+        All pages behind such a place are displaced, so that it is in the last page that is sound, or before.
+        """
+        if self._first_broken is None or not self._may_be_displaced:
+            return set()
+        suspect = self._first_broken - 1
+        while suspect > 1 and not self._owners[suspect]:
+            suspect -= 1
+        first_byte = (suspect - 1) * self._header.page_bytes
+        behind = {owner for owner in self._owners[suspect:] if owner > 0}
+        return behind | {cell.key for cell in cells if cell.start >= first_byte}
+
+    def _is_broken(self, page: int) -> None:
+        """Remember that what a page of the file says is wrong."""
+        if 1 <= page <= self.count:
+            self._first_broken = min(page, self._first_broken or page)
 
     def payload(self, cell: Cell) -> bytes:
         """Return the record of a row.
@@ -189,14 +213,22 @@ class Pages:
     def _chain(self, cell: Cell) -> Iterator[int]:
         """Yield the overflow pages of a row."""
         page, left = cell.overflow, cell.size - cell.local_bytes
+        holder = cell.start // self._header.page_bytes + 1
+        if left > self.count * self._header.usable_bytes:
+            raise BadPageError("it is larger than the file")
         while left > 0:
             if not 2 <= page <= self.count:
+                # that of a file that ends early is right all the same
+                if not self.count < page <= (self._header.pages or 0):
+                    self._is_broken(holder)
                 raise BadPageError(f"overflow page {page} is missing")
             yield page
             self._file.seek((page - 1) * self._header.page_bytes)
+            holder = page
             (page,) = struct.unpack(">I", self._file.read(4))
             left -= self._header.usable_bytes - 4
         if page:
+            self._is_broken(holder)
             raise BadPageError("its overflow pages go on after its end")
 
     def _page(self, number: int) -> bytes:
@@ -218,6 +250,7 @@ class Pages:
             else:
                 cells, children = [], _children(page, start, low, high)
         except (BadPageError, IndexError, struct.error):
+            self._is_broken(number)
             rows.gaps.append(Gap(number, low, high))
             return
         self._owners[number] = _TREE

@@ -331,6 +331,25 @@ def test_damaged_pages(tmp_path: Path) -> None:
     refused(path, "none of this SQLite file", "copy it again")
 
 
+@pytest.mark.parametrize("change", ["removed", "added"])
+def test_bytes_that_are_removed_or_added_displace_all_behind_them(tmp_path: Path, change: str) -> None:
+    """As by a transfer that converts line endings. The row that it happens in is not sound either."""
+    messages = [bags.recorded_map("/r1/map", bags.START + each, seed=each, rows=300) for each in range(8)]
+    whole = bags.write_bare_db3(tmp_path / "a.db3", messages).read_bytes()
+    recorded = _recorded(messages)
+    (tmp_path / "broken").mkdir()
+    path = tmp_path / "broken" / "broken.db3"
+    counts = set()
+    for at in range(30_000, len(whole) - 5000, 3001):
+        path.write_bytes(whole[:at] + (whole[at + 1 :] if change == "removed" else b"\r" + whole[at:]))
+        found, losses = _read(path)
+        assert [each for each in found if each not in recorded] == []
+        assert len(found) < len(recorded)
+        assert losses != ()
+        counts.add(len(found))
+    assert counts == {0, 3, 5, 7}
+
+
 def test_a_row_without_bytes_is_named(tmp_path: Path) -> None:
     path = bags.write_bare_db3(tmp_path / "a.db3")
     _execute(path, "UPDATE messages SET data = 'text' WHERE id = 2")
