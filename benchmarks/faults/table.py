@@ -48,17 +48,22 @@ class Fault:
         Whether a format can have it.
     silent_in
         Formats in which nothing that is left tells that messages are missing, and why that is so.
+    is_rewritten
+        Whether checksums are made right for what is changed, so that they tell nothing.
     """
 
     change: Change
     fits: Callable[[Format], bool]
     silent_in: Mapping[str, str]
+    is_rewritten: bool = False
 
 
 def _bytes(
     change: Callable[[bytes, Rng], bytes | None],
     container: Container | None = None,
     silent_in: Mapping[str, str] | None = None,
+    *,
+    is_rewritten: bool = False,
 ) -> Fault:
     """Return a fault of the bytes of one file; of a container's own structure only where it is not compressed."""
 
@@ -69,9 +74,10 @@ def _bytes(
         data = change(recording.files[chosen], rng)
         return None if data is None else Variant(Recording({**recording.files, chosen: data}, recording.main))
 
-    return Fault(
-        varied, lambda kind: container in {None, "" if kind.is_compressed else kind.container}, silent_in or {}
-    )
+    def fits(kind: Format) -> bool:
+        return container in {None, "" if kind.is_compressed else kind.container}
+
+    return Fault(varied, fits, silent_in or {}, is_rewritten)
 
 
 def _beside(change: Callable[[str, bytes, Rng], Mapping[str, bytes]]) -> Fault:
@@ -145,8 +151,8 @@ FAULTS: Mapping[str, Fault] = {
     "mcap_chunk_crc_wrong": _bytes(mcap.chunk_crc_wrong, "mcap"),
     "mcap_chunk_size_wrong": _bytes(mcap.chunk_size_wrong, "mcap"),
     "mcap_chunk_compression_wrong": _bytes(mcap.chunk_compression_wrong, "mcap"),
-    "mcap_inner_length_inflated": _bytes(mcap.inner_length_inflated, "mcap"),
-    "mcap_inner_record_removed": _bytes(mcap.inner_record_removed, "mcap", _NOBODY_COUNTS),
+    "mcap_inner_length_inflated": _bytes(mcap.inner_length_inflated, "mcap", _NOBODY_COUNTS, is_rewritten=True),
+    "mcap_inner_record_removed": _bytes(mcap.inner_record_removed, "mcap", _NOBODY_COUNTS, is_rewritten=True),
     "mcap_summary_crc_wrong": _bytes(mcap.summary_crc_wrong, "mcap"),
     "mcap_summary_falsified": _bytes(mcap.summary_falsified, "mcap"),
     "mcap_message_index_falsified": _bytes(mcap.message_index_falsified, "mcap"),

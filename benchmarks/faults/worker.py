@@ -75,7 +75,8 @@ def expected_of(case: Case, variant: Variant) -> Expected:
         undamaged_run(case.format).merged if variant.told is None else None,
         variant.recording.main,
         tuple(FLOOR_FROM_MAP),
-        is_checked=kind.is_checked or variant.told is not None,
+        is_checked=(kind.is_checked or variant.told is not None) and not fault.is_rewritten,
+        topics=frozenset((each.topic, each.msgtype) for each in recorded),
         leaves_no_trace=case.format in fault.silent_in,
     )
 
