@@ -14,6 +14,7 @@ what is left, in a process with little memory and little time. What came of it i
     runner, remembered         one replay, with all that is to be judged
     placement, oracle          where maps truly lie; the verdict
     worker, pool               processes with limits
+    kills, whole_runs          misfortunes of whole runs
     printed                    the table of verdicts
 
 docs/reliability.md has the figures, and what the program promises.

@@ -17,8 +17,10 @@ from benchmarks.faults.oracle import FAILURES
 from benchmarks.faults.pool import Done, Worker, run_all
 from benchmarks.faults.printed import Counts
 from benchmarks.faults.table import FAULTS
+from benchmarks.faults.whole_runs import tried
 
 TRIES = 10_000
+WHOLE_RUNS = "whole runs"
 _PROGRAM_EVERY = 20
 
 
@@ -30,6 +32,8 @@ class Options:
     ----------
     seconds
         After so long nothing new is begun; None for no limit.
+    runs
+        How often each misfortune of a whole run is tried.
     keep
         Folder for variants that failed; None for none.
     """
@@ -40,6 +44,7 @@ class Options:
     formats: Sequence[str] = tuple(FORMATS)
     faults: Sequence[str] = tuple(FAULTS)
     jobs: int = 1
+    runs: int = 0
     keep: Path | None = None
 
 
@@ -68,6 +73,10 @@ def measured(options: Options) -> Counts:
         counts.add(done.task.case, done.judged.verdict)
         if done.judged.verdict in FAILURES:
             _say(done, options)
+    for name, judged in tried(options.runs, options.seed):
+        counts.add(Case(WHOLE_RUNS, name, 0), judged.verdict)
+        if judged.verdict in FAILURES:
+            print(f"{judged.verdict}: {name}: {judged.why}", flush=True)
     return counts
 
 
@@ -109,6 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--formats", nargs="+", choices=tuple(FORMATS), default=tuple(FORMATS), metavar="FORMAT")
     parser.add_argument("--faults", nargs="+", choices=tuple(FAULTS), default=tuple(FAULTS), metavar="FAULT")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="how many processes work at once")
+    parser.add_argument("--runs", type=int, default=0, help="how often whole runs are killed, starved and so on")
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="folder for variants that failed")
     parser.add_argument("--by-format", action="store_true", help="print a table of formats as well")
     parser.add_argument("--replay", metavar="CASE", help="try one again, such as mcap_zstd/truncated/17")

@@ -146,7 +146,15 @@ def frame_wrong(recorded: Messages, rng: Rng) -> Messages:
 
 def topic_wrong(recorded: Messages, rng: Rng) -> Messages:
     """Let a robot's topic have such a name."""
-    names = ("/../../x/map", "/r2\x1b[31m/map", "/r2\nr3/map", "/" + "r" * 3000 + "/map", "//map", "r2 map", "/r2/map/")
+    names = (
+        "/../../x/map",
+        "/r2\x1b[31m/map",
+        "/r2\nr3/map",
+        "/" + "r" * 3000 + "/map",
+        "//map",
+        "r2 map",
+        "/%s{0}/map",
+    )
     name, old = names[int(rng.integers(len(names)))], f"/r{int(rng.integers(1, 4))}/map"
     return [replace(each, topic=name) if each.topic == old else each for each in recorded]
 

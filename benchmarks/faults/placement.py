@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from replay.events import Merged
 MOST_M, MOST_DEG = 0.30, 3.0
 """Two cells: what may come of a map of which a part is damaged."""
 _LEAST_ALIKE = 0.8
+_LEAST_ALIKE_SHIFTED = 0.7
 
 
 def misplaced(event: Merged, latest: Mapping[str, Grid]) -> list[str]:
@@ -36,28 +38,42 @@ def misplaced(event: Merged, latest: Mapping[str, Grid]) -> list[str]:
 
 def error_of(reference: str, target: Grid, robot: str, source: Grid, target_from_source: Sim2) -> str:
     """Return what is wrong with a placement; "" if nothing."""
-    true_target, true_source = _owner(target, reference), _owner(source, robot)
-    if (true_target == STRANGER) != (true_source == STRANGER):
-        return f"though its map is of {true_source} and the reference's of {true_target}"
+    true_target, true_source = _shown(target, reference), _shown(source, robot)
+    if (true_target.robot == STRANGER) != (true_source.robot == STRANGER):
+        return f"though its map is of {true_source.robot} and the reference's of {true_target.robot}"
     cell = np.array([[source.cols / 2, source.rows / 2]])
     found_m = target.map_from_grid.inverse().apply(
         target_from_source.apply(source.map_from_grid.apply(cell * source.resolution_m))
     )
-    true = FLOOR_FROM_MAP[true_target].inverse() @ FLOOR_FROM_MAP[true_source]
+    true = FLOOR_FROM_MAP[true_target.robot].inverse() @ FLOOR_FROM_MAP[true_source.robot]
+    true_cell = true.apply((cell - true_source.shift) * RESOLUTION_M)[0] / RESOLUTION_M + true_target.shift
     # In cells, so that a resolution that is not the true one shows as well.
-    off = found_m[0] / target.resolution_m - true.apply(cell * RESOLUTION_M)[0] / RESOLUTION_M
-    off_m = float(np.hypot(*off)) * RESOLUTION_M
+    off_m = float(np.hypot(*(found_m[0] / target.resolution_m - true_cell))) * RESOLUTION_M
     yaw_rad = target_from_source.yaw_rad + source.map_from_grid.yaw_rad - target.map_from_grid.yaw_rad
     off_deg = abs(math.degrees(wrap_angle(yaw_rad - true.yaw_rad)))
     return "" if off_m <= MOST_M and off_deg <= MOST_DEG else f"{off_m:.2f} m and {off_deg:.1f}° from where it lies"
 
 
-def _owner(grid: Grid, name: str) -> str:
-    """Return whose map this is: told by its cells or, where they are like nobody's, by its name."""
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """Whose map a grid shows, and by how many columns and rows it is shifted."""
+
+    robot: str
+    shift: tuple[int, int] = (0, 0)
+
+
+def _shown(grid: Grid, name: str) -> _Shown:
+    """Return what a grid shows: told by its cells or, where they are like nobody's, by its name.
+
+    Damage can move bytes, and so shift the cells of a map, or put them into the message of another robot.
+    """
     alike = {robot: _alike(grid, robot) for robot in FLOOR_FROM_MAP}
     best = max(alike, key=lambda robot: alike[robot])
+    if alike[best] >= _LEAST_ALIKE:
+        return _Shown(best)
+    share, shifted = max((_shifted(grid, robot) for robot in FLOOR_FROM_MAP), key=lambda item: item[0])
     known = name if name in FLOOR_FROM_MAP else best
-    return best if alike[best] >= _LEAST_ALIKE else known
+    return shifted if share >= _LEAST_ALIKE_SHIFTED else _Shown(known)
 
 
 def _alike(grid: Grid, robot: str) -> float:
@@ -73,3 +89,28 @@ def _all_cells(robot: str) -> list[np.ndarray]:
 def _same(cells: np.ndarray, others: np.ndarray) -> float:
     known = (cells >= 0) | (others >= 0)
     return float(np.mean(cells[known] == others[known])) if known.any() else 0.0
+
+
+def _shifted(grid: Grid, robot: str) -> tuple[float, _Shown]:
+    """Return which share of a grid's known cells is of a robot's map that was moved along its bytes, and how far."""
+    best = 0.0, _Shown(robot)
+    flat = grid.cells.reshape(-1)
+    for cells in _all_cells(robot):
+        if cells.shape != grid.cells.shape or not (flat >= 0).any():
+            continue
+        free, walls = (_correlated(flat == value, cells.reshape(-1) == value) for value in (0, 100))
+        same = free + walls
+        by = int(np.argmax(same))
+        by = by - len(same) if by > len(same) // 2 else by
+        rows = round(by / grid.cols)
+        share = float(np.max(same)) / int((flat >= 0).sum())
+        if share > best[0]:
+            best = share, _Shown(robot, (by - rows * grid.cols, rows))
+    return best
+
+
+def _correlated(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return for each shift how often both are so; shifts to the left are at the end."""
+    size = 2 * len(one)
+    spectrum = np.fft.rfft(one, size) * np.conj(np.fft.rfft(other, size))
+    return np.round(np.fft.irfft(spectrum, size))

@@ -30,13 +30,14 @@ class RememberingMerger:
         self._steps: list[tuple[Mapping[str, Grid], Mapping[str, Prior], bool]] = []
         self._key = hashlib.sha256(repr((tuple(robots), config)).encode())
         self._result: MergeResult | None = None
+        self._last: MergeResult
         self.latest: dict[str, Grid] = {}
         """The last map of each robot."""
 
     @property
     def result(self) -> MergeResult:
         """All that is known after the last step."""
-        return self._computed().result if self._result is None else self._result
+        return self._new().result if self._result is None else self._result
 
     def explain(self, pair: Pair) -> tuple[Evidence, ...]:
         """Return what the merger saw of a pair."""
@@ -50,23 +51,23 @@ class RememberingMerger:
         self._steps.append((grids, dict(priors or {}), is_last))
         self._key.update(_text(grids, priors or {}, is_last=is_last))
         key = self._key.digest()
-        found = _known.get(key)
-        if found is None:
-            found = _known[key] = self._computed().result
+        if key not in _known:
+            self._computed()
+            _known[key] = self._last
             while len(_known) > _MOST:
                 _known.popitem(last=False)
-        else:
-            _known.move_to_end(key)
-        self._result = found
-        return found
+        _known.move_to_end(key)
+        self._result = _known[key]
+        return self._result
 
     def _computed(self) -> Merger:
         """Return a merger that has taken all steps so far."""
         if self._merger is None:
             self._merger = self._new()
+            self._last = self._merger.result
         steps, self._steps = self._steps, []
         for grids, priors, is_last in steps:
-            self._merger.step(grids, priors, is_last=is_last)
+            self._last = self._merger.step(grids, priors, is_last=is_last)
         return self._merger
 
 

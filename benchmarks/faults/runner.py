@@ -7,9 +7,9 @@ import hashlib
 import io
 import json
 import traceback
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -79,6 +79,8 @@ class Ran:
         What was said not to be used.
     unused
         How many messages are on map topics that were said to be no robot's.
+    topics
+        How many messages are on each topic, by its name and type.
     misplaced
         Maps that were placed where they do not lie, in words.
     merged
@@ -94,6 +96,7 @@ class Ran:
     used: tuple[Used, ...] = ()
     named: tuple[Named, ...] = ()
     unused: int = 0
+    topics: Mapping[tuple[str, str], int] = field(default_factory=dict)
     misplaced: tuple[str, ...] = ()
     merged: tuple[str, ...] = ()
     program: str = ""
@@ -118,6 +121,7 @@ def _replayed(path: Path) -> Ran:
     options = _options(path)
     with _remembering() as mergers, open_plan(options) as plan:
         unused = _unused(plan)
+        topics = {(each.name, each.msgtype): each.message_count for info in plan.infos for each in info.topics}
         for event in pipeline.events(_watched(plan, seen), options):
             if isinstance(event, Skipped):
                 named.append(Named.of(event))
@@ -126,7 +130,14 @@ def _replayed(path: Path) -> Ran:
                 wrong.update(dict.fromkeys(misplaced(event, mergers[-1].latest)))
     skipped = {(each.topic, each.log_time_ns) for each in named if not each.place}
     used = tuple(Used.of(raw) for raw in seen if (raw.topic, raw.log_time_ns) not in skipped)
-    return Ran(used=used, named=tuple(named), unused=unused, misplaced=tuple(wrong), merged=_merged(last))
+    return Ran(
+        used=used,
+        named=tuple(named),
+        unused=unused,
+        topics=topics,
+        misplaced=tuple(wrong),
+        merged=_merged(last),
+    )
 
 
 def _unused(plan: Plan) -> int:

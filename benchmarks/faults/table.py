@@ -31,6 +31,8 @@ class Variant:
     told: tuple[Message, ...] | None = None
 
 
+_NOBODY_COUNTS = {"mcap_no_summary": "nothing in the file counts its messages"}
+
 Change = Callable[[str, Rng], Variant | None]
 
 
@@ -46,17 +48,22 @@ class Fault:
         Whether a format can have it.
     silent_in
         Formats in which nothing that is left tells that messages are missing, and why that is so.
+    is_rewritten
+        Whether checksums are made right for what is changed, so that they tell nothing.
     """
 
     change: Change
     fits: Callable[[Format], bool]
     silent_in: Mapping[str, str]
+    is_rewritten: bool = False
 
 
 def _bytes(
     change: Callable[[bytes, Rng], bytes | None],
     container: Container | None = None,
     silent_in: Mapping[str, str] | None = None,
+    *,
+    is_rewritten: bool = False,
 ) -> Fault:
     """Return a fault of the bytes of one file; of a container's own structure only where it is not compressed."""
 
@@ -67,9 +74,10 @@ def _bytes(
         data = change(recording.files[chosen], rng)
         return None if data is None else Variant(Recording({**recording.files, chosen: data}, recording.main))
 
-    return Fault(
-        varied, lambda kind: container in {None, "" if kind.is_compressed else kind.container}, silent_in or {}
-    )
+    def fits(kind: Format) -> bool:
+        return container in {None, "" if kind.is_compressed else kind.container}
+
+    return Fault(varied, fits, silent_in or {}, is_rewritten)
 
 
 def _beside(change: Callable[[str, bytes, Rng], Mapping[str, bytes]]) -> Fault:
@@ -132,19 +140,19 @@ FAULTS: Mapping[str, Fault] = {
     "as_text": _bytes(raw.as_text),
     "twice": _bytes(raw.twice),
     # records of MCAP files
-    "mcap_records_swapped": _bytes(mcap.records_swapped, "mcap"),
+    "mcap_records_swapped": _bytes(mcap.records_swapped, "mcap", _NOBODY_COUNTS),
     "mcap_record_doubled": _bytes(mcap.record_doubled, "mcap"),
-    "mcap_record_removed": _bytes(mcap.record_removed, "mcap"),
+    "mcap_record_removed": _bytes(mcap.record_removed, "mcap", _NOBODY_COUNTS),
     "mcap_cut_between_records": _bytes(mcap.cut_between_records, "mcap"),
     "mcap_length_inflated": _bytes(mcap.length_inflated, "mcap"),
-    "mcap_opcode_changed": _bytes(mcap.opcode_changed, "mcap"),
+    "mcap_opcode_changed": _bytes(mcap.opcode_changed, "mcap", _NOBODY_COUNTS),
     "mcap_summary_removed": _bytes(mcap.summary_removed, "mcap"),
     "mcap_indexes_removed": _bytes(mcap.indexes_removed, "mcap"),
     "mcap_chunk_crc_wrong": _bytes(mcap.chunk_crc_wrong, "mcap"),
     "mcap_chunk_size_wrong": _bytes(mcap.chunk_size_wrong, "mcap"),
     "mcap_chunk_compression_wrong": _bytes(mcap.chunk_compression_wrong, "mcap"),
-    "mcap_inner_length_inflated": _bytes(mcap.inner_length_inflated, "mcap"),
-    "mcap_inner_record_removed": _bytes(mcap.inner_record_removed, "mcap"),
+    "mcap_inner_length_inflated": _bytes(mcap.inner_length_inflated, "mcap", _NOBODY_COUNTS, is_rewritten=True),
+    "mcap_inner_record_removed": _bytes(mcap.inner_record_removed, "mcap", _NOBODY_COUNTS, is_rewritten=True),
     "mcap_summary_crc_wrong": _bytes(mcap.summary_crc_wrong, "mcap"),
     "mcap_summary_falsified": _bytes(mcap.summary_falsified, "mcap"),
     "mcap_message_index_falsified": _bytes(mcap.message_index_falsified, "mcap"),

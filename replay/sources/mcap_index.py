@@ -105,13 +105,9 @@ class Summary:
 
 def read_summary(file: RecordFile) -> Summary | None:
     """Return the summary of a file; None if it has none, or one that is not sound."""
-    unsound: tuple[type[Exception], ...] = (
-        BadPart,
-        *(each for each in foreign_errors() if not issubclass(each, OSError)),
-    )
     try:
         return _summary(file)
-    except unsound:
+    except _unsound():
         # what it should say is found by a pass through the file
         return None
 
@@ -135,6 +131,36 @@ def _summary(file: RecordFile) -> Summary | None:
     before = file.record_at(file.size - len(MAGIC) - _FOOTER.size - len(section) - _DATA_END_BYTES)
     data_end = before.start if before and before.opcode == DATA_END else None
     return Summary(table, statistics, tuple(chunks), is_checked, data_end)
+
+
+def statistics_between(file: RecordFile, data_end: int, footer: int) -> Statistics | None:
+    """Return what the records between the data and the footer count, wherever the footer says that they begin.
+
+    None if they count nothing, or a checksum says that they are not what was written.
+    """
+    from mcap import records
+
+    file.file.seek(footer)
+    record = file.file.read(_FOOTER.size)
+    if not data_end < footer or footer - data_end > file.most_bytes or len(record) < _FOOTER.size:
+        return None
+    crc = _FOOTER.unpack(record)[-1]
+    if crc not in {0, zlib.crc32(record[:-4], file_crc(file, data_end, footer))}:
+        return None
+    file.file.seek(data_end)
+    section = file.file.read(footer - data_end)
+    try:
+        for inner in inner_records(section):
+            if inner.opcode == STATISTICS:
+                found: Statistics = records.Statistics.read(parser_stream(section[inner.content : inner.end]))
+                return found
+    except _unsound():
+        return None
+    return None
+
+
+def _unsound() -> tuple[type[Exception], ...]:
+    return (BadPart, *(each for each in foreign_errors() if not issubclass(each, OSError)))
 
 
 def _summary_section(file: RecordFile) -> tuple[bytes, bool] | None:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, BinaryIO, NamedTuple, TypeVar
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
 from replay.sources.boundary import COMMON
 from replay.sources.definitions import differing_field
-from replay.sources.topics import normalised_type, type_in
+from replay.sources.topics import ENCODINGS, normalised_type, type_in
 
 if TYPE_CHECKING:
     from mcap.data_stream import ReadDataStream
@@ -242,6 +242,9 @@ def _channel(described: _Described, schema: _Schema | None) -> Channel:
         difference = differing_field(msgtype, text, 1 if encoding == "ros1" else 2)
         if difference is not None:
             return Channel(topic, f"{msgtype} (another definition)", encoding, difference)
+    if encoding not in ENCODINGS and normalised_type(schema.name) in {GRID_TYPE, UPDATE_TYPE}:
+        problem = f"its maps are encoded as '{encoding}'; {' or '.join(ENCODINGS)} is read: convert the recording"
+        return Channel(topic, msgtype, encoding, problem)
     return Channel(topic, msgtype, encoding)
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from replay.skip_cause import SkipCause
 from replay.sources.losses import Loss
 from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content, inner_records
-from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, Summary, file_crc
+from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, Summary, file_crc, statistics_between
 from replay.sources.mcap_records import (
     CHANNEL,
     CHUNK,
@@ -73,9 +73,9 @@ def scan(file: RecordFile, wanted: Callable[[Channel], bool], summary: Summary |
     walk = Walk(file, summary.places if summary else ())
     found = _Found(file, wanted, summary)
     for record in walk:
-        if record.opcode == CHUNK and walk.data_end is None:
+        if record.opcode == CHUNK:
             found.add_chunk(record)
-        elif record.opcode == MESSAGE and walk.data_end is None:
+        elif record.opcode == MESSAGE:
             found.add_loose(record)
         elif record.opcode in {SCHEMA, CHANNEL}:
             found.describe(record, is_repeated=walk.data_end is not None)
@@ -224,9 +224,17 @@ class _Found:
         losses += [self._gap_loss(gap) for gap in walk.gaps]
         if walk.ends_early is not None:
             losses.append(_ends_early(walk.ends_early, self._file))
-        if not losses and counted_all is not None:
-            losses += _missing(counted_all.channel_message_counts, contents)
+        if not losses:
+            losses += _missing(self._said_counts(walk), contents)
         return [*losses, *self._after_the_end(walk), *unknown]
+
+    def _said_counts(self, walk: Walk) -> Mapping[int, int]:
+        """Return how many messages of each channel the file says that it has; nothing if it does not say."""
+        said = self._summary.statistics if self._summary else None
+        if said is None and walk.data_end is not None and walk.footer is not None:
+            # What comes before the summary may have become shorter or longer, so that it is not where it should be.
+            said = statistics_between(self._file, walk.data_end.end, walk.footer.start)
+        return said.channel_message_counts if said else {}
 
     def _gap_loss(self, gap: Gap) -> Loss:
         lost = indexed_counts(self._file, gap.stop)
@@ -301,7 +309,7 @@ def unknown_types(contents: Contents) -> list[Loss]:
 
 
 def _missing(counts: Mapping[int, int], contents: Contents) -> list[Loss]:
-    """Return of which channels there are fewer messages than a sound summary counts."""
+    """Return of which channels there are fewer messages than the summary counts."""
     losses = []
     for key, count in sorted(counts.items()):
         short = count - contents.counts.get(key, 0)

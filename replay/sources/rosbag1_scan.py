@@ -116,6 +116,8 @@ class Scan:
         self.is_cut = file.size <= file.start
         # what is written when all chunks are
         self._has_all_chunks = 0 < file.index_pos <= file.size
+        self._index_pos = file.index_pos
+        self._cut_at = file.size
         self._size = file.size
         self._file = file.file
         self._losses = losses
@@ -139,7 +141,7 @@ class Scan:
     @property
     def lost_at_end(self) -> int | None:
         """How many messages are lost because the file ends early; None if that cannot be told."""
-        return 0 if self._has_all_chunks else None
+        return 0 if self._has_all_chunks and self._cut_at >= self._index_pos else None
 
     def counts(self) -> Mapping[int, int]:
         """Return how many messages each connection has."""
@@ -186,6 +188,7 @@ class Scan:
         # Bytes that were reserved for a recording and never written are zero.
         if following is None and (is_cut or not any(self._bytes(start, 64))):
             self.is_cut = True
+            self._cut_at = start
         else:
             self._finish_chunk()
             until = "to the end of the file" if following is None else f"up to byte {following}"

@@ -116,7 +116,7 @@ class Sqlite3File(Closing):
                 check_applied(database, wal, self.path, self.losses)
             tables = SqliteTables(database)
             # all that is read of them but the data of messages
-            tables.counts(), tables.times_ns(), tables.topics(), tables.definitions()
+            tables.counts(), tables.indexed(), tables.times_ns(), tables.topics(), tables.definitions()
         except NoBagError as error:
             raise InputError(f"{self.path}: this SQLite file is no ROS 2 bag: {error}") from error
         except sqlite3.DatabaseError as error:
@@ -163,6 +163,10 @@ class Sqlite3File(Closing):
             if key not in topics:
                 detail = "the table of topics has no such topic"
                 self.losses.add(Loss(SkipCause.UNKNOWN_TYPE, f"topic {key!r}", detail, count))
+        there, indexed = sum(counts.values()), self._tables.indexed()
+        if indexed > there:
+            detail = f"the index on time lists {indexed} messages, and {there} are there"
+            self.losses.add(Loss(SkipCause.DAMAGED, "the table of messages", detail, indexed - there))
         return topics
 
     def _rows(self, topic_ids: Collection[int]) -> Iterator[Row]:
@@ -219,6 +223,9 @@ def _topic(row: Record, count: int, definitions: Sequence[Record]) -> _Topic:
     name, encoding = _text(row, "name"), _text(row, "serialization_format")
     msgtype = type_in(encoding, _text(row, "type"))
     plain = normalised_type(_text(row, "type"))
+    if "/" not in plain:
+        problem = f"its type is {row.get('type')!r}, which is the name of none"
+        return _Topic(name, msgtype, encoding, count, problem)
     if plain not in _DECODED_TYPES:
         return _Topic(name, msgtype, encoding, count)
     if encoding != "cdr":

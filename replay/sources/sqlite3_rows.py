@@ -20,7 +20,11 @@ _TOPICS = "SELECT * FROM topics"
 _DEFINITIONS = "SELECT * FROM message_definitions"
 # The index on time may be damaged while the table is not.
 _COUNTS = "SELECT topic_id, count(*) FROM messages NOT INDEXED GROUP BY topic_id"
+# SQLite counts what is smallest, which is an index if there is one.
+_INDEXED = "SELECT count(*) FROM messages"
 _TIMES = "SELECT min(timestamp), max(timestamp) FROM messages"
+# Slower; texts and bytes sort after all numbers.
+_TIMES_THAT_ARE = f"{_TIMES} WHERE typeof(timestamp) = 'integer'"
 _ROWS = "SELECT timestamp, id, topic_id FROM messages WHERE topic_id IN ({}) ORDER BY timestamp, id"
 _DATA = "SELECT timestamp, topic_id, data FROM messages WHERE id = ?"
 
@@ -55,6 +59,9 @@ class BagTables(Protocol):
 
     def counts(self) -> Mapping[Value, int]:
         """Return how many messages each topic has."""
+
+    def indexed(self) -> int:
+        """Return how many messages there should be."""
 
     def times_ns(self) -> tuple[int, int] | None:
         """Return the times of the first and last message."""
@@ -95,10 +102,18 @@ class SqliteTables:
         """Return how many messages each topic has."""
         return dict(self._database.execute(_COUNTS))
 
+    def indexed(self) -> int:
+        """Return how many messages the index on time lists; those that are there, without one."""
+        (count,) = self._database.execute(_INDEXED).fetchone()
+        return int(count)
+
     def times_ns(self) -> tuple[int, int] | None:
         """Return the times of the first and last message; None if there is none."""
-        start_ns, stop_ns = self._database.execute(_TIMES).fetchone()
-        return (start_ns, stop_ns) if isinstance(start_ns, int) and isinstance(stop_ns, int) else None
+        for query in (_TIMES, _TIMES_THAT_ARE):
+            start_ns, stop_ns = self._database.execute(query).fetchone()
+            if isinstance(start_ns, int) and isinstance(stop_ns, int):
+                return start_ns, stop_ns
+        return None
 
     def rows(self, topic_ids: Collection[int]) -> Iterator[Row]:
         """Yield where the messages of these topics are, in order."""
@@ -197,6 +212,10 @@ class SalvagedTables:
     def counts(self) -> Mapping[Value, int]:
         """Return how many messages of each topic are there."""
         return self._found.counts
+
+    def indexed(self) -> int:
+        """Return how many messages are there; what is lost is named already."""
+        return len(self._rows)
 
     def times_ns(self) -> tuple[int, int] | None:
         """Return the times of the first and last message that are there."""

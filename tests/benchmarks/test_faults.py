@@ -187,6 +187,13 @@ class TestPlacement:
         assert "°" in placement.error_of("r1", target, "r2", moved, true @ Sim2(yaw_rad=0.1))
         assert "of r3" in placement.error_of("r1", target, "r2", robot_map("r3", 2), true)
 
+    def test_cells_that_damage_has_moved_lie_where_they_were_moved_to(self):
+        cells = np.roll(robot_map("r2", 2).cells.reshape(-1), 7 * 80 - 3).reshape(66, 80)
+        true = FLOOR_FROM_MAP["r1"].inverse() @ FLOOR_FROM_MAP["r2"]
+        target = robot_map("r1", 2)
+        assert placement.error_of("r1", target, "r1", Grid(cells, 0.15), true @ Sim2(3 * 0.15, -7 * 0.15)) == ""
+        assert placement.error_of("r1", target, "r1", Grid(cells, 0.15), true)
+
     def test_another_resolution_is_another_place(self):
         wide = Grid(robot_map("r2", 2).cells, 0.2)
         true = FLOOR_FROM_MAP["r1"].inverse() @ FLOOR_FROM_MAP["r2"]
