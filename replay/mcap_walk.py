@@ -23,7 +23,8 @@ from replay.sources.mcap_records import (
     Record,
     RecordFile,
     foreign_errors,
-    message_at,
+    message_data,
+    message_header_at,
     parser_stream,
 )
 from replay.words import counted
@@ -125,10 +126,10 @@ class Walk:
 
     def _item(self, record: bytes, opcode: int) -> _Item:
         if opcode == MESSAGE:
-            message = message_at(record, 0)
-            if message is None:
+            header, data = message_header_at(record, 0), message_data(record, 0)
+            if header is None or data is None:
                 raise InputError(f"{self._records.path}: a message of {len(record)} bytes is too short to be one")
-            return message
+            return header, data
         content = record[_HEAD_BYTES:]
         if opcode == ATTACHMENT:
             self._check_attachment(content)

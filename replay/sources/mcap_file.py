@@ -21,7 +21,7 @@ from replay.sources.mcap_records import (
     Channel,
     RecordFile,
     foreign_errors,
-    message_at,
+    message_data,
     message_header_at,
     written_bytes,
 )
@@ -231,21 +231,24 @@ class _Chunks:
             If its chunk is found to be bad.
         """
         if entry.inner == NO_CHUNK:
-            container, start = self._file.record_bytes(entry.block), 0
-        elif entry.block in self._bad:
+            return self._checked(self._file.record_bytes(entry.block), 0)
+        if entry.block in self._bad:
             return None
-        else:
-            try:
-                container, start = self._held[entry.block], entry.inner
-            except BadPart:
-                self._bad.add(entry.block)
-                raise
-        message = message_at(container, start)
+        try:
+            content = self._held[entry.block]
+        except BadPart:
+            self._bad.add(entry.block)
+            raise
         if is_last:
             self._held.forget(entry.block)
-        if message is None:
+        return self._checked(content, entry.inner)
+
+    def _checked(self, container: bytes, start: int) -> bytes:
+        """Return the data of the message that was found at a byte before."""
+        data = message_data(container, start)
+        if data is None:
             raise ValueError("it changed while it was read")
-        return message[1]
+        return data
 
     def _loaded(self, start: int) -> bytes:
         """Return what is in a chunk."""

@@ -95,14 +95,15 @@ def message_header_at(container: bytes, start: int) -> MessageHeader | None:
     return message_header(container, content)
 
 
-def message_at(container: bytes, start: int) -> tuple[MessageHeader, bytes] | None:
-    """Return the header and a copy of the data of the message record at a byte of the container; None if none is."""
-    header = message_header_at(container, start)
-    if header is None:
-        return None
-    _, length = RECORD.unpack_from(container, start)
+def message_data(container: bytes, start: int) -> bytes | None:
+    """Return a copy of the data of the message record at a byte of the container; None if none is."""
     content = start + RECORD.size
-    return header, container[content + MESSAGE_HEAD.size : content + length]
+    if content > len(container):
+        return None
+    opcode, length = RECORD.unpack_from(container, start)
+    if opcode != MESSAGE or length < MESSAGE_HEAD.size or content + length > len(container):
+        return None
+    return container[content + MESSAGE_HEAD.size : content + length]
 
 
 @dataclass(frozen=True, slots=True)

@@ -76,7 +76,7 @@ def scan(file: RecordFile, wanted: Callable[[Channel], bool], summary: Summary |
         if record.opcode == CHUNK:
             found.add_chunk(record)
         elif record.opcode == MESSAGE:
-            found.add_loose(record)
+            found.add_loose(record, message_header(walk.head))
         elif record.opcode in {SCHEMA, CHANNEL}:
             found.describe(record, is_repeated=walk.data_end is not None)
     return found.scan(walk)
@@ -127,14 +127,14 @@ class _Found:
         except BadPart as error:
             self._bad_chunks.append((record.start, error, indexed_counts(self._file, record.end)))
 
-    def add_loose(self, record: Record) -> None:
+    def add_loose(self, record: Record, message: MessageHeader) -> None:
         """Take in a message outside of chunks."""
         length = record.end - record.start
         if length > self._file.most_bytes:
             detail = f"it has {length} bytes; at most {self._file.most_bytes} are read"
             self._losses.append(Loss(SkipCause.OVER_MEMORY, f"the message at byte {record.start}", detail, 1))
             return
-        self._add(self._file.message_header(record), record.start, NO_CHUNK, self._others)
+        self._add(message, record.start, NO_CHUNK, self._others)
 
     def _add_content(self, content: bytes, start: int, messages: _Messages) -> None:
         records = list(inner_records(content))

@@ -1,10 +1,13 @@
 """The records of an MCAP file one after the other, past what is damaged.
 
 A record whose header is damaged hides where the next one begins. Then the next place is looked for from which records
-follow each other as they should: types that there are, lengths that fit the file, and fields that fit the record; of
-messages, which have little that could be told by, times near the ones before. Where a sound summary says at which bytes
-chunks begin, only these are tried. In a recording with chunks a message is never taken for such a place, because it may
-be one within a chunk, whose checksum says nothing of one message.
+follow each other as they should: types that there are, lengths that fit the file, fields that fit the record, and times
+of messages near each other. Where a sound summary says at which bytes chunks begin, these are tried first. In a
+recording with chunks a message is never taken for such a place, because it may be one within a chunk, whose checksum
+says nothing of one message.
+
+A length may be damaged and fit all the same. So what could be of any length is taken for a record only if one follows
+it; if none does, and nothing says that it is the next one which is damaged, both are passed over.
 
 The file is read once from its begin to its end; each place is looked at in constant time.
 """
@@ -47,11 +50,15 @@ _HEAD_BYTES = CHUNK_HEAD_BYTES
 _BLOCK_BYTES = 1 << 20
 _NEAR_NS = 86_400 * 10**9
 _MOST_UNKNOWN = 16
+_MOST_IN_CHAIN = 64
+_LEAST_WEIGHT = 4
 
 _U32 = Struct("<I")
-# At most 4 GiB long, so that half of the length is zeros.
-_ANY_RECORD = re.compile(rb"[\x01-\x0f](?=[\s\S]{4}\0{4})")
-_NO_MESSAGE = re.compile(rb"[\x02\x06\x07\x09\x0c\x0f](?=[\s\S]{4}\0{4})")
+_U64 = Struct("<Q")
+# Where records may begin again: those that nothing depends on are left out, because they say little of themselves.
+# They are at most 4 GiB long, so that half of the length is zeros.
+_ANY_RECORD = re.compile(rb"[\x02-\x07\x0f](?=[\s\S]{4}\0{4})")
+_NO_MESSAGE = re.compile(rb"[\x02\x06\x07\x0f](?=[\s\S]{4}\0{4})")
 
 # How long the content of a record is at least, and where in it the length of its first text is, if it has one.
 _SHAPES: dict[int, tuple[int, int | None]] = {
@@ -101,6 +108,8 @@ class Walk:
         The record that closes the data section, if it was met.
     footer
         The record that closes the file, if it was met.
+    head
+        How the content of the record begins that was yielded last.
     """
 
     def __init__(self, file: RecordFile, chunk_starts: Sequence[int] = ()) -> None:
@@ -109,12 +118,14 @@ class Walk:
         self.cut_chunk: int | None = None
         self.data_end: Record | None = None
         self.footer: Record | None = None
+        self.head = b""
         self._file = file
         self._chunk_starts = chunk_starts
         self._has_chunks = bool(chunk_starts)
         self._has_header = False
         self._time_ns: int | None = None
         self._resumed: tuple[int, int | None] = (-1, None)
+        self._looked_at: tuple[int, tuple[Record, bytes] | None] = (-1, None)
 
     def __iter__(self) -> Iterator[Record]:
         start = self._after_magic(len(MAGIC))
@@ -141,14 +152,25 @@ class Walk:
 
     def _after_magic(self, start: int) -> int:
         """Return where records begin; the magic bytes may be there several times."""
-        self._file.file.seek(start)
-        while self._file.file.read(len(MAGIC)) == MAGIC:
+        while self._is_magic(start):
             start += len(MAGIC)
         return start
 
+    def _is_magic(self, start: int) -> bool:
+        if start > self._file.size:
+            return False
+        self._file.file.seek(start)
+        return self._file.file.read(len(MAGIC)) == MAGIC
+
+    def _head(self, start: int) -> tuple[Record, bytes] | None:
+        """Return what is at a byte as a record; what was looked at last is not read again."""
+        if self._looked_at[0] != start:
+            self._looked_at = start, self._file.head_at(start, _HEAD_BYTES)
+        return self._looked_at[1]
+
     def _next(self, start: int) -> Record | None:
         """Return the record at a byte; None if there is none that can be taken for one."""
-        found = self._file.head_at(start, _HEAD_BYTES)
+        found = self._head(start)
         if found is None or not self._file.is_whole(found[0]):
             return None
         record, head = found
@@ -161,7 +183,7 @@ class Walk:
             # a chunk that nothing but itself speaks against is left to who reads it
             return record if record.opcode == CHUNK and self._follows(record.end) else None
         self._has_chunks |= record.opcode in {CHUNK, MESSAGE_INDEX}
-        if record.opcode not in _SURE and not self._follows(record.end):
+        if not self._is_sure(record):
             after = self._resume(record.end)
             if after is None:
                 # the end of the file, unless this record reaches over others
@@ -172,7 +194,14 @@ class Walk:
                 return None
         if record.opcode == MESSAGE:
             self._time_ns = message_header(head).log_time_ns
+        self.head = head
         return record
+
+    def _is_sure(self, record: Record) -> bool:
+        """Tell whether a plausible record leaves no doubt, by itself or by what follows it."""
+        if record.opcode == DATA_END and self.gaps:
+            return self._closes(record.end)
+        return record.opcode in _SURE or self._follows(record.end)
 
     def _is_suspicious(self, record: Record) -> bool:
         """Tell whether a record is of a type that there is not, or not here, or of a private one yet like messages."""
@@ -201,7 +230,7 @@ class Walk:
         for _ in range(_MOST_UNKNOWN):
             if start in {self._file.size, self._file.written}:
                 return True
-            found = self._file.head_at(start, _HEAD_BYTES)
+            found = self._head(start)
             if found is None or not self._file.is_whole(found[0]):
                 return False
             if found[0].opcode in _KNOWN:
@@ -242,8 +271,7 @@ class Walk:
         if record.opcode == DATA_END:
             return length == 4
         if record.opcode == FOOTER:
-            self._file.file.seek(record.end)
-            return length == 20 and self._file.file.read(len(MAGIC)) == MAGIC
+            return length == 20 and self._is_magic(record.end)
         least, text_at = _SHAPES[record.opcode]
         return length >= least and (text_at is None or _number(head, text_at) <= length - least)
 
@@ -252,7 +280,7 @@ class Walk:
         if self.data_end is not None:
             return
         self.ends_early = start
-        found = self._file.head_at(start, _HEAD_BYTES)
+        found = self._head(start)
         if found and found[0].opcode == CHUNK and is_consistent(*found):
             self.cut_chunk = start
 
@@ -268,7 +296,7 @@ class Walk:
         return self._resumed[1]
 
     def _sought(self, start: int) -> int | None:
-        found = self._file.head_at(start, _HEAD_BYTES)
+        found = self._head(start)
         if found and found[0].opcode == CHUNK:
             if is_consistent(*found):
                 # the file was cut off here
@@ -293,26 +321,67 @@ class Walk:
             start += _BLOCK_BYTES
 
     def _is_chain(self, start: int) -> bool:
-        """Tell whether so many records follow each other from here that it is no chance."""
-        needed = 3
-        for number in range(3):
-            found = self._file.head_at(start, _HEAD_BYTES)
-            if found is None or found[0].opcode not in _KNOWN or not self._is_plausible(*found):
+        """Tell whether so much fits together from here that it is no chance."""
+        weight, first_ns = 0, self._time_ns
+        for _ in range(_MOST_IN_CHAIN):
+            found = self._head(start)
+            if found is None or not self._may_continue(*found):
                 return False
             record, head = found
             if not self._file.is_whole(record):
                 return record.opcode == CHUNK
-            if record.opcode in {CHUNK, DATA_END, FOOTER} or record.end == self._file.size:
+            if record.opcode == DATA_END:
+                return self._closes(record.end)
+            if record.opcode in {CHUNK, FOOTER} or record.end == self._file.size:
                 return True
-            if record.opcode == MESSAGE and self._is_near(head):
-                needed = 2
-            if number + 1 >= needed:
+            if record.opcode == MESSAGE:
+                time_ns = message_header(head).log_time_ns
+                is_near = first_ns is not None and abs(time_ns - first_ns) < _NEAR_NS
+                if weight and not is_near:
+                    return False
+                # the first may be far from all before, as after a clock was set; then those after it are near to it
+                first_ns = first_ns if is_near else time_ns
+                weight += 2 if is_near else 1
+            weight += record.opcode == MESSAGE_INDEX and self._has_chunks
+            if weight >= _LEAST_WEIGHT:
                 return True
             start = record.end
         return True
 
-    def _is_near(self, head: bytes) -> bool:
-        return self._time_ns is not None and abs(message_header(head).log_time_ns - self._time_ns) < _NEAR_NS
+    def _may_continue(self, record: Record, head: bytes) -> bool:
+        """Tell whether a record may be one of those from which on all is sound."""
+        if record.opcode not in _KNOWN or not self._is_plausible(record, head):
+            return False
+        return record.opcode not in {SCHEMA, CHANNEL} or self._is_filled(record)
+
+    def _is_filled(self, record: Record) -> bool:
+        """Tell whether the three texts of a schema or channel take up all of it."""
+        at = record.content + (_SHAPES[record.opcode][1] or 0)
+        for _ in range(3):
+            if at + _U32.size > record.end:
+                return False
+            self._file.file.seek(at)
+            at += _U32.size + _number(self._file.file.read(_U32.size), 0)
+        return at == record.end
+
+    def _closes(self, start: int) -> bool:
+        """Tell whether the data section may end at this byte."""
+        if start == self._file.size:
+            return True
+        found = self._head(start)
+        if found and found[0].opcode == FOOTER:
+            return self._is_plausible(*found)
+        footer = self._file.head_at(self._file.size - len(MAGIC) - RECORD.size - 20, 20)
+        if footer and footer[0].opcode == FOOTER and _U64.unpack_from(footer[1])[0] == start:
+            return True
+        for _ in range(_LEAST_WEIGHT):
+            found = self._head(start)
+            if found is None or not self._file.is_whole(found[0]) or found[0].opcode not in _KNOWN - {DATA_END}:
+                return False
+            if not self._is_plausible(*found):
+                return False
+            start = found[0].end
+        return True
 
 
 def _number(head: bytes, at: int) -> int:

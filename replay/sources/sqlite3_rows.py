@@ -215,7 +215,7 @@ class SalvagedTables:
 
     def indexed(self) -> int:
         """Return how many messages are there; what is lost is named already."""
-        return len(self._rows)
+        return sum(self._found.counts.values())
 
     def times_ns(self) -> tuple[int, int] | None:
         """Return the times of the first and last message that are there."""

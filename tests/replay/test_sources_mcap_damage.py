@@ -514,6 +514,22 @@ def test_after_a_damaged_chunk_header_the_next_chunk_is_found(tmp_path: Path, in
         assert any(str(start) in loss.place for loss in losses)
 
 
+def test_bytes_that_look_like_records_are_not_taken_for_them(tmp_path: Path) -> None:
+    """Cells of a map are such bytes: zeros, and small numbers between them."""
+    cells = np.random.default_rng(1)
+    junk = np.where(cells.random(1 << 20) < 0.5, 0, cells.integers(0, 16, 1 << 20)).astype(np.uint8).tobytes()
+    path = bags.write_mcap(tmp_path / "a.mcap", SMALL * 20, use_chunking=False, **NO_SUMMARY)
+    data = path.read_bytes()
+    start, _ = _place(data, MESSAGE, 60)
+    path.write_bytes(data[:start] + junk + data[start:])
+    found, losses, _ = _read(path)
+    # the message before may be the one whose length is damaged
+    assert 119 <= len(found) <= 120
+    assert set(found) == set(_written(SMALL))
+    (loss,) = losses
+    assert loss.place.endswith(f" to {start + len(junk)}")
+
+
 def test_records_of_private_and_later_types_are_passed_over(tmp_path: Path) -> None:
     private = struct.pack("<BQ", 0x80, 5) + b"hello" + struct.pack("<BQ", 0xFF, 0)
     data = private + _described() + _message(1, 5) + private + _message(1, 6) + private
