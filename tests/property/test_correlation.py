@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from mapmerge.grid import Grid
@@ -44,6 +44,8 @@ def middle_m(floor_from_map):
 @settings(max_examples=FEWER)
 @given(angles, resolutions_m, resolutions_m, frames, frames, seeds)
 def test_swapping_two_maps_gives_the_inverse(yaw_rad, one_m, other_m, one_frame, other_frame, seed):
+    # of a map and its copy in the same frame nothing tells which is which
+    assume(abs(yaw_rad) > 1e-3 or one_frame != other_frame)
     target, floor_from_target = seen_from(0.0, one_m, seed, one_frame)
     source, floor_from_source = seen_from(yaw_rad, other_m, seed + 7, other_frame)
     there, back = match_grids(MATCHER, target, source), match_grids(MATCHER, source, target)
