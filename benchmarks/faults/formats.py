@@ -65,6 +65,8 @@ class Format:
         What holds the messages.
     is_checked
         Whether checksums protect the bytes of each message, so that no changed one may be used.
+    are_names_checked
+        Whether they protect what names topics and types as well.
     is_folder, is_compressed, is_split
         Whether it is a folder; whether whole files are compressed; whether there are several parts.
     """
@@ -74,6 +76,7 @@ class Format:
     container: Container
     encoding: Encoding = "cdr"
     is_checked: bool = False
+    are_names_checked: bool = False
     is_folder: bool = False
     is_compressed: bool = False
     is_split: bool = False
@@ -228,12 +231,14 @@ FORMATS: Mapping[str, Format] = {
     # rosbag checks what it compresses with lz4, the writer of rosbags does not
     "bag_lz4": Format(_bag("lz4", content_checksum=True), "run.bag", "bag", "ros1", is_checked=True),
     "bag_lz4_unchecked": Format(_bag("lz4"), "run.bag", "bag", "ros1"),
-    "mcap_zstd": Format(_Mcap(), "run.mcap", "mcap", is_checked=True),
-    "mcap_lz4": Format(_Mcap(compression="lz4"), "run.mcap", "mcap", is_checked=True),
-    "mcap_none": Format(_Mcap(compression="none"), "run.mcap", "mcap", is_checked=True),
-    "mcap_ros1": Format(_Mcap("ros1"), "run.mcap", "mcap", "ros1", is_checked=True),
-    "mcap_no_index": Format(_Mcap(options=_no_index()), "run.mcap", "mcap", is_checked=True),
-    "mcap_no_summary": Format(_Mcap(options=_no_summary()), "run.mcap", "mcap", is_checked=True),
+    "mcap_zstd": Format(_Mcap(), "run.mcap", "mcap", is_checked=True, are_names_checked=True),
+    "mcap_lz4": Format(_Mcap(compression="lz4"), "run.mcap", "mcap", is_checked=True, are_names_checked=True),
+    "mcap_none": Format(_Mcap(compression="none"), "run.mcap", "mcap", is_checked=True, are_names_checked=True),
+    "mcap_ros1": Format(_Mcap("ros1"), "run.mcap", "mcap", "ros1", is_checked=True, are_names_checked=True),
+    "mcap_no_index": Format(_Mcap(options=_no_index()), "run.mcap", "mcap", is_checked=True, are_names_checked=True),
+    "mcap_no_summary": Format(
+        _Mcap(options=_no_summary()), "run.mcap", "mcap", is_checked=True, are_names_checked=True
+    ),
     "mcap_no_crc": Format(_Mcap(compression="none", options={"enable_crcs": False}), "run.mcap", "mcap"),
     "mcap_unchunked": Format(_Mcap(options={"use_chunking": False}), "run.mcap", "mcap"),
     "mcap_folder": Format(_folder("mcap"), "run", "mcap", is_folder=True),

@@ -47,6 +47,8 @@ class Expected:
         Names of the robots, which an error that is about them must mention.
     is_checked
         Whether checksums protect the messages.
+    are_names_checked
+        Whether checksums protect what names topics and types.
     topics
         The topics that are in it, by name and type.
     leaves_no_trace
@@ -58,6 +60,7 @@ class Expected:
     main: str
     robots: tuple[str, ...]
     is_checked: bool
+    are_names_checked: bool = True
     topics: frozenset[tuple[str, str]] = frozenset()
     leaves_no_trace: bool = False
 
@@ -105,7 +108,7 @@ def _judge_messages(ran: Ran, expected: Expected) -> Judged:
     silent = len(missing) - len(foreign) - _most_named(ran)
     if silent > 0:
         what = f"{len(missing)} messages are missing, of {silent} nothing was said: {missing}{said}"
-        is_renamed = not expected.is_checked and silent <= _renamed(ran, expected)
+        is_renamed = not expected.are_names_checked and silent <= _renamed(ran, expected)
         return Judged(Verdict.UNPROTECTED if expected.leaves_no_trace or is_renamed else Verdict.WRONG, what)
     if foreign:
         return Judged(Verdict.UNPROTECTED, f"used and not recorded so: {foreign}{said}")

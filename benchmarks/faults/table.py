@@ -154,7 +154,7 @@ FAULTS: Mapping[str, Fault] = {
     "mcap_inner_length_inflated": _bytes(mcap.inner_length_inflated, "mcap", _NOBODY_COUNTS, is_rewritten=True),
     "mcap_inner_record_removed": _bytes(mcap.inner_record_removed, "mcap", _NOBODY_COUNTS, is_rewritten=True),
     "mcap_summary_crc_wrong": _bytes(mcap.summary_crc_wrong, "mcap"),
-    "mcap_summary_falsified": _bytes(mcap.summary_falsified, "mcap"),
+    "mcap_summary_falsified": _bytes(mcap.summary_falsified, "mcap", is_rewritten=True),
     "mcap_message_index_falsified": _bytes(mcap.message_index_falsified, "mcap"),
     "mcap_schema_removed": _bytes(mcap.schema_removed, "mcap"),
     "mcap_schema_emptied": _bytes(mcap.schema_emptied, "mcap"),

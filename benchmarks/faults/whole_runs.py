@@ -49,7 +49,7 @@ def no_space(random: Random, folder: Path) -> Judged:
     """Let no file grow beyond a size that is somewhere within that of the outputs."""
     limit_bytes = int(2.0 ** random.uniform(6, 21))
     run = _started(folder, "-c", _LIMITED, str(limit_bytes))
-    return _judged(_ended(run), folder)
+    return judged(_ended(run), folder)
 
 
 def folder_gone(random: Random, folder: Path) -> Judged:
@@ -61,7 +61,7 @@ def folder_gone(random: Random, folder: Path) -> Judged:
     ended = _ended(run)
     if ended.status == 0 and not (folder / "out").exists():
         return Judged(Verdict.RIGHT)  # it was done before
-    return _judged(ended, folder)
+    return judged(ended, folder)
 
 
 def two_at_once(random: Random, folder: Path) -> Judged:
@@ -72,7 +72,7 @@ def two_at_once(random: Random, folder: Path) -> Judged:
     ended = [_ended(run) for run in runs]
     if not any(each.status == 0 for each in ended):
         return Judged(Verdict.WRONG, f"neither run was done: {ended}")
-    return max((_judged(each, folder) for each in ended), key=lambda judged: list(Verdict).index(judged.verdict))
+    return max((judged(each, folder) for each in ended), key=lambda found: list(Verdict).index(found.verdict))
 
 
 def cut_while_read(random: Random, folder: Path) -> Judged:
@@ -86,7 +86,7 @@ def cut_while_read(random: Random, folder: Path) -> Judged:
     ended = _ended(run)
     if ended.status in {0, 1} and "skipped" in ended.said:
         return Judged(Verdict.NAMED, ended.said)
-    return _judged(ended, folder, changed=True)
+    return judged(ended, folder, changed=True)
 
 
 MISFORTUNES: Mapping[str, Misfortune] = {
@@ -106,7 +106,7 @@ def tried(count: int, seed: int) -> Iterator[tuple[str, Judged]]:
                 yield name, misfortune(Random(f"{seed} {name} {number}"), Path(folder))  # noqa: S311
 
 
-def _judged(ended: Ended, folder: Path, *, changed: bool = False) -> Judged:
+def judged(ended: Ended, folder: Path, *, changed: bool = False) -> Judged:
     """Judge how a run ended that was not killed."""
     lines = ended.said.splitlines()
     if ended.status is None:

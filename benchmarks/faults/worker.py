@@ -68,6 +68,7 @@ def answer(task: Task) -> Judged | None:
 def expected_of(case: Case, variant: Variant) -> Expected:
     """Return what is right for a variant."""
     kind, fault = FORMATS[case.format], FAULTS[case.fault]
+    is_told = variant.told is not None
     recorded = messages() if variant.told is None else variant.told
     maps = [raw for raw in kind.raw(recorded) if raw.msgtype in {GRID_TYPE, UPDATE_TYPE}]
     return Expected(
@@ -75,7 +76,8 @@ def expected_of(case: Case, variant: Variant) -> Expected:
         undamaged_run(case.format).merged if variant.told is None else None,
         variant.recording.main,
         tuple(FLOOR_FROM_MAP),
-        is_checked=(kind.is_checked or variant.told is not None) and not fault.is_rewritten,
+        is_checked=(kind.is_checked or is_told) and not fault.is_rewritten,
+        are_names_checked=(kind.are_names_checked or is_told) and not fault.is_rewritten,
         topics=frozenset((each.topic, each.msgtype) for each in recorded),
         leaves_no_trace=case.format in fault.silent_in,
     )

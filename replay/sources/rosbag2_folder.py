@@ -108,7 +108,7 @@ def merged_by_time(parts: Sequence[Part], topics: Collection[str]) -> Iterator[R
     with ExitStack() as stack:
         streams = [stack.enter_context(closing(part.messages(topics))) for part in parts]
         due: list[tuple[int, int, RawMessage | None]] = [
-            (part.info.start_ns, index, None) for index, part in enumerate(parts) if part.info.start_ns is not None
+            (part.info.start_ns or 0, index, None) for index, part in enumerate(parts)
         ]
         heapq.heapify(due)
         while due:

@@ -23,8 +23,8 @@ _COUNTS = "SELECT topic_id, count(*) FROM messages NOT INDEXED GROUP BY topic_id
 # SQLite counts what is smallest, which is an index if there is one.
 _INDEXED = "SELECT count(*) FROM messages"
 _TIMES = "SELECT min(timestamp), max(timestamp) FROM messages"
-# Slower; texts and bytes sort after all numbers.
-_TIMES_THAT_ARE = f"{_TIMES} WHERE typeof(timestamp) = 'integer'"
+# Slower. The index on time may be damaged, and texts and bytes sort after all numbers.
+_TIMES_THAT_ARE = f"{_TIMES} NOT INDEXED WHERE typeof(timestamp) = 'integer'"
 _ROWS = "SELECT timestamp, id, topic_id FROM messages WHERE topic_id IN ({}) ORDER BY timestamp, id"
 _DATA = "SELECT timestamp, topic_id, data FROM messages WHERE id = ?"
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from benchmarks.faults import __main__ as command
-from benchmarks.faults import placement, remembered, worker
+from benchmarks.faults import placement, remembered, whole_runs, worker
 from benchmarks.faults.cases import Case, Task, cases
 from benchmarks.faults.formats import FORMATS, undamaged
 from benchmarks.faults.mcap_layout import closed, parsed
-from benchmarks.faults.oracle import Expected, Judged, Verdict, judge
+from benchmarks.faults.oracle import FAILURES, Expected, Judged, Verdict, judge
 from benchmarks.faults.pool import Worker, run_all
 from benchmarks.faults.printed import Counts
 from benchmarks.faults.runner import Named, Ran, Used
@@ -26,6 +26,26 @@ from replay.sources.base import RawMessage
 from replay.sources.mcap_file import McapFile
 
 SEED = 7
+# Variants that once ended wrongly, by seed.
+FOUND = [
+    (0, "mcap_none/mcap_channel_encoding_changed/0"),
+    (0, "mcap_zstd/mcap_inner_record_removed/0"),
+    (0, "mcap_lz4/mcap_record_removed/0"),
+    (0, "mcap_zstd/bits_flipped_in_tail/0"),
+    (0, "mcap_none/message_resolution_wrong/0"),
+    (0, "db3_folder/message_origin_wrong/0"),
+    (0, "db3/db3_row_topic_wrong/0"),
+    (0, "db3/db3_topic_removed/0"),
+    (0, "bag_lz4/bag_record_doubled/0"),
+    (2, "mcap_none/mcap_records_swapped/1"),
+    (2, "mcap_unchunked/mcap_records_swapped/0"),
+    (2, "bag_lz4/bits_flipped/1"),
+    (3, "mcap_folder/truncated/0"),
+    (3, "db3_folder/db3_row_time_wrong/0"),
+    (3, "db3_split/db3_pages_swapped/1"),
+    (3, "db3_folder/db3_topic_wrong/2"),
+    (3, "bag_bz2/tail_zeroed/0"),
+]
 ONE, TWO, OTHER = Used("/r1/map", 1, "aa"), Used("/r2/map", 2, "bb"), Used("/r2/map", 2, "cc")
 EXPECTED = Expected(frozenset({ONE, TWO}), ("r1", "r2", "dd"), "run.mcap", ("r1", "r2"), is_checked=True)
 RIGHT = Ran(used=(ONE, TWO), merged=("r1", "r2", "dd"))
@@ -82,8 +102,17 @@ class TestOracle:
         assert judge(replace(RIGHT, used=(ONE, OTHER)), unchecked).verdict is Verdict.UNPROTECTED
         assert judge(LOST, unchecked).verdict is Verdict.WRONG
         assert judge(LOST, replace(unchecked, leaves_no_trace=True)).verdict is Verdict.UNPROTECTED
+        elsewhere = replace(LOST, topics={("/r2/mbp", "nav_msgs/msg/OccupancyGrid"): 1})
+        assert judge(elsewhere, replace(unchecked, are_names_checked=False)).verdict is Verdict.UNPROTECTED
+        assert judge(elsewhere, unchecked).verdict is Verdict.WRONG
         misplaced = replace(RIGHT, used=(ONE, OTHER), misplaced=("r2",))
         assert judge(misplaced, unchecked).verdict is Verdict.WRONG
+
+
+@pytest.mark.parametrize(("seed", "name"), FOUND)
+def test_what_once_ended_wrongly_does_not(seed, name):
+    judged = worker.answer(Task(Case.named(name, seed)))
+    assert judged.verdict not in FAILURES, judged.why
 
 
 class TestFakeFailures:
@@ -223,10 +252,9 @@ class TestCases:
 
     def test_every_fault_changes_something(self):
         for fault, row in FAULTS.items():
-            kind = next(name for name in reversed(FORMATS) if row.fits(FORMATS[name]))
-            variants = [Case(kind, fault, number, SEED).variant() for number in range(6)]
-            whole = undamaged(kind)
-            assert any(each and each.recording != whole for each in variants), fault
+            cases_of_it = (Case(kind, fault, number, SEED) for number in range(3) for kind in FORMATS)
+            variants = ((each.format, each.variant()) for each in cases_of_it if row.fits(FORMATS[each.format]))
+            assert any(each and each.recording != undamaged(kind) for kind, each in variants), fault
 
     @pytest.mark.parametrize("name", ["", "mcap_zstd/truncated", "mcap_zstd/none/1", "no/truncated/1", "db3/zeroed/x"])
     def test_a_name_that_is_none(self, name):
@@ -285,6 +313,31 @@ def test_counts_are_of_faults_or_of_formats():
         ["db3", "2"],
         ["all", "3"],
     ]
+
+
+@pytest.mark.parametrize(
+    ("status", "said", "verdict"),
+    [
+        (0, "", Verdict.RIGHT),
+        (3, "replay: error: no space is left", Verdict.ERROR),
+        (3, "Traceback", Verdict.CRASHED),
+        (-6, "", Verdict.CRASHED),
+        (None, "", Verdict.HUNG),
+        (3, "replay: what now", Verdict.WRONG),
+    ],
+)
+def test_whole_runs_are_judged_by_how_they_end_and_what_they_leave(status, said, verdict, tmp_path):
+    (tmp_path / "in").mkdir()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "in" / "run.mcap").write_bytes(whole_runs.SAMPLE.read_bytes())
+    if status == 0:
+        for name in whole_runs.FINALS:
+            (tmp_path / "out" / name).touch()
+    ended = whole_runs.Ended(status, said)
+    assert whole_runs.judged(ended, tmp_path).verdict is verdict
+    (tmp_path / "out" / "out.mcap.partial").touch()
+    left = whole_runs.judged(ended, tmp_path)
+    assert left.verdict is (Verdict.WRONG if status in {0, 3} and said != "Traceback" else verdict)
 
 
 def test_equal_steps_are_merged_once(monkeypatch):
