@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -54,4 +55,9 @@ class Disc:
 def _dilated(image: Image, down: int, across: int) -> Image:
     if down == across == 0:
         return image
-    return np.asarray(cv2.dilate(image, np.ones((2 * down + 1, 2 * across + 1), np.uint8)), np.uint8)
+    return np.asarray(cv2.dilate(image, _box(2 * down + 1, 2 * across + 1)), np.uint8)
+
+
+@cache
+def _box(rows: int, cols: int) -> Image:
+    return np.ones((rows, cols), np.uint8)

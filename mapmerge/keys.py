@@ -51,6 +51,8 @@ def exchanged(values: NDArray[_Item], gone: Indices, before: Indices, new: NDArr
     """Return values without those at some indices, and with new ones before those at others; both sorted."""
     if len(gone) + len(before) == 0:
         return values
+    if len(values) == 0:
+        return new
     # what changes is near to each other: all else is copied as it is
     begin = int(min(*gone[:1], *before[:1], len(values)))
     end = int(max(*gone[-1:] + 1, *before[-1:], begin))

@@ -12,15 +12,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.align import evenly
+from mapmerge.align import evenly, middle_of
 from mapmerge.config import RefineConfig
 from mapmerge.prepared import CELL_OCCUPIED, PreparedMap
 from mapmerge.sim2 import Points, Sim2
 
 Floats = NDArray[np.float32]
 
-_CONVERGED_M = 2e-4
-_CONVERGED_RAD = 2e-5
+_CONVERGED_M = 5e-4
+_CONVERGED_RAD = 5e-5
 _MIN_PAIRS = 12
 _SLACK_CELLS, _SLACK_SQUARES = 3.0, 2.0
 
@@ -46,7 +46,7 @@ def polish(target: PreparedMap, wall_cells_m: Points, start: Sim2, config: Refin
     if len(points_m) < _MIN_PAIRS:
         return start
     windows = _Windows(target, len(points_m), config.blur_cells)
-    middle_m = points_m.mean(axis=0)
+    middle_m = middle_of(points_m)
     powers = _powers(points_m - middle_m)
     middle = complex(*middle_m.tolist())
     turn = start.scale * cmath.exp(1j * start.yaw_rad)

@@ -56,16 +56,18 @@ class NearestWalls:
         rows, cols = self.index.shape
         inverse = np.float32(1.0 / self.cell_m)
         first_col, first_row = (np.float32(-corner_m / self.cell_m) for corner_m in self.corner_m)
-        col = np.clip(x_m * inverse + first_col, 0, cols - 1).astype(np.int32)
-        row = np.clip(y_m * inverse + first_row, 0, rows - 1).astype(np.int32)
-        found: NDArray[np.int32] = self.index.ravel()[row * cols + col]
-        return found
+        col = (x_m * inverse + first_col).clip(0, cols - 1).astype(np.int32)
+        row = (y_m * inverse + first_row).clip(0, rows - 1).astype(np.int32)
+        row *= np.int32(cols)
+        row += col
+        return self.index.ravel().take(row)
 
     def distance_m(
         self, wall: NDArray[np.int32], x_m: NDArray[np.float32], y_m: NDArray[np.float32]
     ) -> NDArray[np.float32]:
         """Return how far places are from the walls of these numbers, each from one."""
-        return np.asarray(np.hypot(self.x_m[wall] - x_m, self.y_m[wall] - y_m), np.float32)
+        away_x, away_y = self.x_m.take(wall) - x_m, self.y_m.take(wall) - y_m
+        return np.asarray(np.sqrt(away_x * away_x + away_y * away_y), np.float32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mapmerge.align import Poses, placed, poses_of
 from mapmerge.config import MergeConfig, VerifyConfig
@@ -144,17 +145,23 @@ def _direction(target: PreparedMap, source: PreparedMap, pose: Poses, config: Ve
     tolerance_m = max(config.tolerance_m, target.resolution_m)
     x, y = (values[0] for values in placed(pose, source.walls_m))
     wall = target.nearest.wall_at(x, y)
-    met = target.nearest.distance_m(wall, x, y) <= tolerance_m
-    if not met.any():
+    met = np.flatnonzero(target.nearest.distance_m(wall, x, y) <= tolerance_m)
+    if len(met) == 0:
         return 0.0, 0.0
-    there = target.nearest.directions[wall[met]]
+    there = target.nearest.directions.take(wall.take(met), axis=0)
     cos, sin = math.cos(2.0 * float(pose[0, 2])), math.sin(2.0 * float(pose[0, 2]))
-    here = source.directions[met] @ np.array([[cos, sin], [-sin, cos]])
-    strength = np.hypot(*there.T) * np.hypot(*here.T)
+    here = source.directions.take(met, axis=0) @ np.array([[cos, sin], [-sin, cos]])
+    length = _lengths(there)
+    strength = length * _lengths(here)
     total = float(strength.sum())
     # directions are of twice the angle: along the weakest axis only walls hold that run well across most of them
     main = (there * strength[:, None]).sum(axis=0)
     main /= max(float(np.hypot(*main)), 1e-9)
-    across = 0.5 * (1.0 - there @ main / np.maximum(np.hypot(*there.T), 1e-9))
+    across = 0.5 * (1.0 - there @ main / np.maximum(length, 1e-9))
     held_m = float((strength * across)[across > _HOLDS].sum()) * source.wall_spacing_m * float(pose[0, 3])
     return float((there * here).sum() / max(total, 1e-9)), held_m
+
+
+def _lengths(vectors: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return the lengths of vectors, shape (N, 2)."""
+    return np.asarray(np.sqrt(np.einsum("na,na->n", vectors, vectors, dtype=np.float64)), np.float64)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.align import Poses, align, evenly, placed
+from mapmerge.align import Poses, align, evenly, middle_of, placed
 from mapmerge.config import MergeConfig, VerifyConfig
 from mapmerge.match.pair import PairOfMaps
 from mapmerge.score import agreement, probe
@@ -162,7 +162,7 @@ def distinct(poses: Poses, walls_m: NDArray[np.float64], distance_m: float, angl
 
     Placements differ if they take the middle of the walls further apart, turn further apart, or scale by a twentieth.
     """
-    x, y = (values[:, 0].tolist() for values in placed(poses, walls_m.mean(axis=0)[None]))
+    x, y = (values[:, 0].tolist() for values in placed(poses, middle_of(walls_m)[None]))
     turns, sizes = poses[:, 2].tolist(), np.log(poses[:, 3]).tolist()
     kept: list[int] = []
     for row in range(len(poses)):

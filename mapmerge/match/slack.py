@@ -67,13 +67,13 @@ class _Field:
 
     def index(self, x_m: Floats, y_m: Floats) -> NDArray[np.intp]:
         rows, cols = self.x_m.shape
-        col = np.clip(((x_m - self.corner_m[0]) / self.cell_m).astype(np.intp), 0, cols - 1)
-        row = np.clip(((y_m - self.corner_m[1]) / self.cell_m).astype(np.intp), 0, rows - 1)
+        col = ((x_m - self.corner_m[0]) / self.cell_m).astype(np.intp).clip(0, cols - 1)
+        row = ((y_m - self.corner_m[1]) / self.cell_m).astype(np.intp).clip(0, rows - 1)
         return np.asarray(row * cols + col, np.intp)
 
     def at(self, x_m: Floats, y_m: Floats) -> tuple[Floats, Floats]:
         index = self.index(x_m, y_m)
-        return self.x_m.ravel()[index], self.y_m.ravel()[index]
+        return self.x_m.ravel().take(index), self.y_m.ravel().take(index)
 
 
 def slack(target: PreparedMap, source: PreparedMap, target_from_source: Sim2, config: SlackConfig) -> Slack:
@@ -115,14 +115,14 @@ def _bent(target: PreparedMap, x: Floats, y: Floats, spacing_m: float, config: S
         error_x, error_y = nearest.x_m.take(wall) - at_x, nearest.y_m.take(wall) - at_y
         square = np.square(error_x) + np.square(error_y)
         near = np.flatnonzero(square <= reach_m**2)
-        error_x, error_y, square = error_x[near], error_y[near], square[near]
+        error_x, error_y, square = error_x.take(near), error_y.take(near), square.take(near)
         weight = spacing_m / (1.0 + square / (0.35 * reach_m) ** 2)
         # of a straight wall only the shift across it is known: n nᵀ for its normal n
-        cos, sin = nearest.directions.take(wall[near], axis=0).T
+        cos, sin = nearest.directions.take(wall.take(near), axis=0).T
         xx, xy, yy = 0.5 * weight * (1.0 - cos), -0.5 * weight * sin, 0.5 * weight * (1.0 + cos)
         asked = np.stack([xx, xy, yy, xx * error_x + xy * error_y, xy * error_x + yy * error_y], axis=1)
         step_x, step_y = _solved(
-            _spread(_summed(asked, index[near], (rows, cols)), config.length_m / cell_m), config.stiffness_m
+            _spread(_summed(asked, index.take(near), (rows, cols)), config.length_m / cell_m), config.stiffness_m
         )
         field = _limited(field, step_x, step_y, config.most_m)
     return field
@@ -144,7 +144,7 @@ def _spread(values: Floats, sigma: float) -> Floats:
 
 def _solved(sums: Floats, stiffness_m: float) -> tuple[Floats, Floats]:
     """Solve the normal equations of each square for one step, damped where there is little wall."""
-    xx, xy, yy, right_x, right_y = np.moveaxis(sums, 2, 0)
+    xx, xy, yy, right_x, right_y = sums.transpose(2, 0, 1)
     xx, yy = xx + np.float32(stiffness_m), yy + np.float32(stiffness_m)
     determinant = xx * yy - xy * xy
     step_x, step_y = (yy * right_x - xy * right_y) / determinant, (xx * right_y - xy * right_x) / determinant

@@ -12,13 +12,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.align import evenly
+from mapmerge.align import evenly, middle_of
 from mapmerge.sim2 import Points
 
 Spectrum = NDArray[np.float64]
 Spectra = NDArray[np.float64]
 
-_AT_ONCE = 1 << 14
+_AT_ONCE = 1 << 15
 _ENOUGH_WALLS = 5_000
 
 
@@ -41,11 +41,12 @@ def orientation_spectra(walls_m: Points, angle_step_rad: float, bin_m: float) ->
     walls_m = evenly(walls_m, _ENOUGH_WALLS)
     if len(walls_m) < 2:
         return np.zeros((2, angles))
-    centred = (walls_m - walls_m.mean(axis=0)) / bin_m
+    centred = (walls_m - middle_of(walls_m)) / bin_m
     reach = float(np.hypot(centred[:, 0], centred[:, 1]).max())
     bins = math.ceil(2 * reach) + 2
     turns = np.arange(angles) * np.pi / angles
-    axes, columns = np.stack([np.cos(turns), np.sin(turns)], axis=1), np.ascontiguousarray(centred.T)
+    axes = np.stack([np.cos(turns), np.sin(turns), np.zeros(angles)], axis=1)
+    columns = np.concatenate([centred.T, np.ones((1, len(centred)))])
     at_once = max(1, _AT_ONCE // len(walls_m))
     parts = [_energies(axes[first : first + at_once], columns, reach, bins) for first in range(0, angles, at_once)]
     spectra = np.concatenate(parts, axis=1)
@@ -60,21 +61,24 @@ def _energies(axes: Points, columns: Points, reach: float, bins: int) -> Spectra
     Parameters
     ----------
     axes
-        Shape (A, 2).
+        Shape (A, 3): cosine, sine, and room for where the bins of each begin.
     columns
-        Points, shape (2, N), in bins.
+        Points in bins, and 1, shape (3, N).
     reach
         How far the furthest one is from the origin.
     bins
         How many there are of each projection.
     """
     # one count for all axes: the bins of each follow those of the one before
+    axes[:, 2] = reach + bins * np.arange(len(axes))
     place = axes @ columns
-    place += reach + bins * np.arange(len(axes))[:, None]
     counts = np.bincount(place.astype(np.intp).ravel(), minlength=bins * len(axes)).reshape(len(axes), bins)
     # neighbouring bins are summed so that a wall on the border of two bins counts in full
     square = np.square(counts[:, :-1] + counts[:, 1:], dtype=np.float64)
-    return np.stack([np.einsum("ab,ab->a", square, square), square.sum(axis=1)])
+    energies = np.empty((2, len(axes)))
+    np.einsum("ab,ab->a", square, square, out=energies[0])
+    np.sum(square, axis=1, out=energies[1])
+    return energies
 
 
 def spectrum_correlation(target: Spectrum, source: Spectrum) -> Spectrum:
