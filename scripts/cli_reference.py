@@ -22,7 +22,7 @@ def reference() -> str:
     environment = {**os.environ, "COLUMNS": "110", "NO_COLOR": "1", "PYTHON_COLORS": "0"}
     parts = [HEAD]
     for command in COMMANDS:
-        arguments = [sys.executable, "-m", "replay.cli", *command, "--help"]
+        arguments = [sys.executable, "-m", "replay", *command, "--help"]
         run = subprocess.run(arguments, capture_output=True, text=True, check=True, env=environment)
         parts.append(f"## {' '.join(('replay', *command))}\n\n```text\n{run.stdout.rstrip()}\n```\n")
     return "\n".join(parts)

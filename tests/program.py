@@ -17,7 +17,7 @@ import pytest
 from replay.cli import main
 from replay.interrupts import NUMBERS
 
-PROGRAM = (sys.executable, "-m", "replay.cli")
+PROGRAM = (sys.executable, "-m", "replay")
 
 
 @dataclass(frozen=True)
