@@ -37,6 +37,7 @@ FOUND = [
     (0, "db3/db3_row_topic_wrong/0"),
     (0, "db3/db3_topic_removed/0"),
     (0, "bag_lz4/bag_record_doubled/0"),
+    (1, "db3_message_zstd/db3_pages_swapped/0"),
     (2, "mcap_none/mcap_records_swapped/1"),
     (2, "mcap_unchunked/mcap_records_swapped/0"),
     (2, "bag_lz4/bits_flipped/1"),
