@@ -74,7 +74,7 @@ def _error(true_target: _Shown, target: Grid, true_source: _Shown, source: Grid,
 def _shown(grid: Grid, name: str) -> list[_Shown]:
     """Return what a grid shows: told by its cells or, where they are like nobody's, by its name.
 
-    Damage can move bytes, and so shift the cells of a map from some byte on, or put cells of another robot's map there.
+    Damage can move bytes, and so shift some of the cells of a map, or put cells of another robot's map there.
     Such a grid shows several things, and lies where any of them does.
     """
     alike = {robot: _alike(grid, robot) for robot in FLOOR_FROM_MAP}
@@ -101,24 +101,28 @@ def _same(cells: np.ndarray, others: np.ndarray) -> float:
 
 
 def _pieces(grid: Grid, robot: str) -> Iterator[_Shown]:
-    """Yield by how much pieces of a robot's map are shifted that a grid shows up to a byte, or from one on."""
+    """Yield by how much pieces of a robot's map are shifted that a grid shows from one byte to another."""
     flat = grid.cells.reshape(-1)
     for cells in _all_cells(robot):
         if cells.shape != grid.cells.shape or not (flat >= 0).any():
             continue
         for by in _likely_shifts(flat, cells.reshape(-1)):
             moved = _moved(cells.reshape(-1), by)
-            if max(_piece(flat, moved), _piece(flat[::-1], moved[::-1])) >= _LEAST_PIECE:
+            if _piece(flat, moved) >= _LEAST_PIECE:
                 rows = round(by / grid.cols)
                 yield _Shown(robot, (by - rows * grid.cols, rows))
 
 
 def _piece(flat: np.ndarray, other: np.ndarray) -> float:
-    """Return which share of the known cells comes before the two are no longer nearly the same."""
+    """Return which share of the known cells is in the longest stretch in which both are nearly the same."""
     known = (flat >= 0) | (other >= 0)
-    alike = np.cumsum(known & (flat == other)) >= _LEAST_ALIKE_IN_PIECE * np.cumsum(known)
-    end = int(np.flatnonzero(alike)[-1]) + 1 if alike.any() else 0
-    return float(np.mean(np.flatnonzero(flat >= 0) < end))
+    # The stretch with the largest sum is one in which at least the wanted share agrees.
+    against = _LEAST_ALIKE_IN_PIECE / (1 - _LEAST_ALIKE_IN_PIECE)
+    sums = np.concatenate([[0.0], np.cumsum(np.where(flat == other, 1.0, -against) * known)])
+    gains = sums - np.minimum.accumulate(sums)
+    end = int(np.argmax(gains))
+    begin = int(np.argmin(sums[: end + 1]))
+    return float(np.sum(flat[begin:end] >= 0) / np.sum(flat >= 0))
 
 
 def _moved(flat: np.ndarray, by: int) -> np.ndarray:
