@@ -33,12 +33,15 @@ TEXT_MODE = (
     " (Git: mark it `binary` in .gitattributes)"
 )
 
+_NO_SPACE = "free space in the temporary folder, or name another in the environment variable TMPDIR"
 # The machine's limits, which say nothing about the recording.
 _LIMITS = {
     errno.EMFILE: "raise the limit (`ulimit -n`), or give fewer recordings at once",
     errno.ENFILE: "close other programs, or raise the limit of the system",
     # Only temporary copies are written: decompressed, or with what was beside them.
-    errno.ENOSPC: "free space in the temporary folder, or name another in the environment variable TMPDIR",
+    errno.ENOSPC: _NO_SPACE,
+    errno.EDQUOT: _NO_SPACE,
+    errno.EFBIG: f"raise the limit (`ulimit -f`), or {_NO_SPACE}",
 }
 
 

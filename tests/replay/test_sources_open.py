@@ -160,7 +160,12 @@ def test_errors_of_libraries_become_one_line(make: Callable[[], Exception]) -> N
 
 @pytest.mark.parametrize(
     ("number", "remedy"),
-    [(errno.EMFILE, "`ulimit -n`"), (errno.ENFILE, "raise the limit"), (errno.ENOSPC, "TMPDIR")],
+    [
+        (errno.EMFILE, "`ulimit -n`"),
+        (errno.ENFILE, "raise the limit"),
+        (errno.ENOSPC, "TMPDIR"),
+        (errno.EDQUOT, "TMPDIR"),
+    ],
 )
 def test_limits_of_the_machine_are_not_blamed_on_the_recording(number: int, remedy: str) -> None:
     with pytest.raises(InputError) as caught, translated(Path("some/recording")):
