@@ -69,6 +69,9 @@ def _line(path: Path, error: Exception, part: str) -> str:
         return f"{path}: it cannot be read: {error.strerror}; {_LIMITS[error.errno]} and try again"
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename or path}: {error.strerror}; expected a recording that can be read"
+    if isinstance(error, MemoryError):
+        what = f"{part} takes" if part else "it takes"
+        return f"{path}: {what} more memory than there is; close other programs, or raise the limit (`ulimit -v`)"
     name, text = type(error).__name__, " ".join(str(error).split())
     found = f"{name}: {text}" if text else name
     what = f"{part} cannot be read" if part else "it cannot be read"
