@@ -136,10 +136,14 @@ def _moved(flat: np.ndarray, by: int) -> np.ndarray:
 
 
 def _likely_shifts(flat: np.ndarray, other: np.ndarray) -> list[int]:
-    """Return the shifts at which most known cells are the same, and none."""
-    same = _correlated(flat == 0, other == 0) + _correlated(flat == 100, other == 100)
-    best = np.argsort(same, kind="stable")[-_SHIFTS:]
-    return sorted({0, *(int(by) - len(same) if by >= len(flat) else int(by) for by in best)})
+    """Return the shifts at which most known cells, or most walls, are the same, and none.
+
+    Walls are narrow: of a piece of a map they tell by how much it is shifted, where free space says little.
+    """
+    walls = _correlated(flat == 100, other == 100)
+    known = walls + _correlated(flat == 0, other == 0)
+    best = (int(by) for same in (walls, known) for by in np.argsort(same, kind="stable")[-_SHIFTS:])
+    return sorted({0, *(by - len(walls) if by >= len(flat) else by for by in best)})
 
 
 def _correlated(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -44,6 +44,7 @@ FOUND = [
     (2, "mcap_no_crc/block_removed/2"),
     (5, "mcap_no_crc/block_removed/0"),
     (5, "bag_lz4_unchecked/block_removed/2"),
+    (6, "mcap_folder/blocks_swapped/1"),
     (3, "mcap_folder/truncated/0"),
     (3, "db3_folder/db3_row_time_wrong/0"),
     (3, "db3_split/db3_pages_swapped/1"),
