@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 MOST_NAMED = 20
 _LONGEST_WORD = 200
+_LONGEST_NAME = 100
 _LONG_WORD = re.compile(rf"\S{{{_LONGEST_WORD + 1},}}")
 
 
@@ -21,6 +22,12 @@ def plain(text: str) -> str:
 def escaped(text: str) -> str:
     """Return text with all that is not seen in it escaped."""
     return text if text.isprintable() else "".join(map(_escaped, text))
+
+
+def brief(name: str) -> str:
+    """Return a name within a line: escaped, and cut if it is too long to be one, whatever words are in it."""
+    shown = escaped(name[: _LONGEST_NAME + 1])
+    return shown if len(shown) <= _LONGEST_NAME else f"{shown[: _LONGEST_NAME - 1]}…"
 
 
 def plain_json(text: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from replay.errors import InputError, UsageError
-from replay.plain_text import listed
+from replay.plain_text import brief, listed
 from replay.robot_names import file_names, is_costmap_or_mask, names_in, namespace
 from replay.runs import RunPath, TopicChoice
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, SourceInfo
@@ -221,5 +221,5 @@ def _nothing(runs: Sequence[RunPath], infos: Sequence[SourceInfo]) -> str:
     if UPDATE_TYPE in types:
         what = "only updates of parts of maps, no full map"
     else:
-        what = f"no map, only {listed(types)}" if types else "no messages"
+        what = f"no map, only {listed([brief(each) for each in types])}" if types else "no messages"
     return f"{paths}: {what}; expected a topic of type {GRID_TYPE}, such as /r1/map"

@@ -56,10 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if name is not None:
         return repeat(Case.named(name, options.seed), options.keep)
     counts = measured(options)
-    for shown in (False, True) if by_format else (False,):
-        print()
-        for line in counts.lines(by_format=shown):
-            print(line)
+    for lines in (counts.lines(), *((counts.lines_of_formats(),) if by_format else ())):
+        print("", *lines, sep="\n")
     print(f"\n{'FAILS' if counts.failures else 'holds'}  crashed, hung or wrong, of {counts.tries}: {counts.failures}")
     return 1 if counts.failures else 0
 
@@ -70,7 +68,7 @@ def measured(options: Options) -> Counts:
     for done in run_all(_tasks(options), options.jobs):
         if done.judged is None:
             continue
-        counts.add(done.task.case, done.judged.verdict)
+        counts.add(done.task.case, done.judged.verdict, done.took_s)
         if done.judged.verdict in FAILURES:
             _say(done, options)
     for name, judged in tried(options.runs, options.seed):

@@ -114,6 +114,15 @@ def header_wrong(data: bytes, rng: Rng) -> bytes:
     return written(records)
 
 
+def chunk_damaged(data: bytes, rng: Rng) -> bytes:
+    """Change bytes of what the first chunk, or one in the middle, holds."""
+    records = parsed(data)
+    found = [index for index, each in enumerate(records) if each.op == _CHUNK]
+    index = found[0 if rng.uniform() < 0.5 else len(found) // 2]
+    records[index] = replace(records[index], data=_noisy(records[index].data, rng))
+    return written(records)
+
+
 def chunk_size_wrong(data: bytes, rng: Rng) -> bytes:
     """Let a chunk say that it is of another size."""
     size = struct.pack("<I", int(rng.integers(2**32)) if rng.uniform() < 0.5 else int(rng.integers(20000)))

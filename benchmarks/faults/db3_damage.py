@@ -57,6 +57,25 @@ def table_wrong(data: bytes, rng: Rng) -> bytes:
     return _changed(data, texts[int(rng.integers(len(texts)))])
 
 
+def schema_wrong(data: bytes, rng: Rng) -> bytes:
+    """Let definitions of messages be missing, empty, others, or in a language that is not known."""
+    column = "encoded_message_definition"
+    others = (
+        f"{column} = ''",
+        f"{column} = x'ff00'",
+        "encoding = 'ros3msg'",
+        f"encoding = NULL, {column} = NULL",
+        f"{column} = 'string note' || char(10) || {column}",
+        f"{column} = replace({column}, 'float32 resolution', 'float64 resolution')",
+    )
+    texts = (
+        "DROP TABLE message_definitions",
+        "DELETE FROM message_definitions",
+        *(f"UPDATE message_definitions SET {each}" for each in others),  # noqa: S608
+    )
+    return _changed(data, texts[int(rng.integers(len(texts)))])
+
+
 def index_removed(data: bytes, rng: Rng) -> bytes:
     """Leave out the index on time, as old recorders do."""
     del rng

@@ -67,8 +67,12 @@ class Format:
         Whether checksums protect the bytes of each message, so that no changed one may be used.
     are_names_checked
         Whether they protect what names topics and types as well.
-    is_folder, is_compressed, is_split
-        Whether it is a folder; whether whole files are compressed; whether there are several parts.
+    compression
+        How what it holds is compressed, "" for not at all; messages and files always with zstd.
+    compressed
+        What is compressed.
+    is_folder, is_split
+        Whether it is a folder; whether there are several parts.
     """
 
     write: Write
@@ -77,9 +81,15 @@ class Format:
     encoding: Encoding = "cdr"
     is_checked: bool = False
     are_names_checked: bool = False
+    compression: Literal["", "bz2", "lz4", "zstd"] = ""
+    compressed: Literal["chunks", "messages", "files"] = "chunks"
     is_folder: bool = False
-    is_compressed: bool = False
     is_split: bool = False
+
+    @property
+    def is_compressed(self) -> bool:
+        """Whether whole files are."""
+        return bool(self.compression) and self.compressed == "files"
 
     def recorded(self, what: Sequence[Message]) -> Recording:
         """Return a recording of these messages."""
@@ -225,28 +235,33 @@ def _bare_db3(path: Path, what: Sequence[Message]) -> None:
     part.rename(path)
 
 
+_CHECKED: dict[str, Any] = {"is_checked": True, "are_names_checked": True}
 FORMATS: Mapping[str, Format] = {
     "bag_none": Format(_bag("none"), "run.bag", "bag", "ros1"),
-    "bag_bz2": Format(_bag("bz2"), "run.bag", "bag", "ros1", is_checked=True),
+    "bag_bz2": Format(_bag("bz2"), "run.bag", "bag", "ros1", is_checked=True, compression="bz2"),
     # rosbag checks what it compresses with lz4, the writer of rosbags does not
-    "bag_lz4": Format(_bag("lz4", content_checksum=True), "run.bag", "bag", "ros1", is_checked=True),
-    "bag_lz4_unchecked": Format(_bag("lz4"), "run.bag", "bag", "ros1"),
-    "mcap_zstd": Format(_Mcap(), "run.mcap", "mcap", is_checked=True, are_names_checked=True),
-    "mcap_lz4": Format(_Mcap(compression="lz4"), "run.mcap", "mcap", is_checked=True, are_names_checked=True),
-    "mcap_none": Format(_Mcap(compression="none"), "run.mcap", "mcap", is_checked=True, are_names_checked=True),
-    "mcap_ros1": Format(_Mcap("ros1"), "run.mcap", "mcap", "ros1", is_checked=True, are_names_checked=True),
-    "mcap_no_index": Format(_Mcap(options=_no_index()), "run.mcap", "mcap", is_checked=True, are_names_checked=True),
-    "mcap_no_summary": Format(
-        _Mcap(options=_no_summary()), "run.mcap", "mcap", is_checked=True, are_names_checked=True
-    ),
+    "bag_lz4": Format(_bag("lz4", content_checksum=True), "run.bag", "bag", "ros1", is_checked=True, compression="lz4"),
+    "bag_lz4_unchecked": Format(_bag("lz4"), "run.bag", "bag", "ros1", compression="lz4"),
+    "mcap_zstd": Format(_Mcap(), "run.mcap", "mcap", compression="zstd", **_CHECKED),
+    "mcap_lz4": Format(_Mcap(compression="lz4"), "run.mcap", "mcap", compression="lz4", **_CHECKED),
+    "mcap_none": Format(_Mcap(compression="none"), "run.mcap", "mcap", **_CHECKED),
+    "mcap_ros1": Format(_Mcap("ros1"), "run.mcap", "mcap", "ros1", compression="zstd", **_CHECKED),
+    "mcap_no_index": Format(_Mcap(options=_no_index()), "run.mcap", "mcap", compression="zstd", **_CHECKED),
+    "mcap_no_summary": Format(_Mcap(options=_no_summary()), "run.mcap", "mcap", compression="zstd", **_CHECKED),
     "mcap_no_crc": Format(_Mcap(compression="none", options={"enable_crcs": False}), "run.mcap", "mcap"),
     "mcap_unchunked": Format(_Mcap(options={"use_chunking": False}), "run.mcap", "mcap"),
     "mcap_folder": Format(_folder("mcap"), "run", "mcap", is_folder=True),
-    "mcap_message_zstd": Format(_folder("mcap", "message"), "run", "mcap", is_folder=True),
+    "mcap_message_zstd": Format(
+        _folder("mcap", "message"), "run", "mcap", compression="zstd", compressed="messages", is_folder=True
+    ),
     "mcap_split": Format(_split("mcap"), "run", "mcap", is_folder=True, is_split=True),
     "db3": Format(_bare_db3, "run.db3", "db3"),
     "db3_folder": Format(_folder("sqlite3"), "run", "db3", is_folder=True),
     "db3_split": Format(_split("sqlite3"), "run", "db3", is_folder=True, is_split=True),
-    "db3_file_zstd": Format(_folder("sqlite3", "file"), "run", "db3", is_folder=True, is_compressed=True),
-    "db3_message_zstd": Format(_folder("sqlite3", "message"), "run", "db3", is_folder=True),
+    "db3_file_zstd": Format(
+        _folder("sqlite3", "file"), "run", "db3", compression="zstd", compressed="files", is_folder=True
+    ),
+    "db3_message_zstd": Format(
+        _folder("sqlite3", "message"), "run", "db3", compression="zstd", compressed="messages", is_folder=True
+    ),
 }

@@ -12,6 +12,7 @@ from benchmarks.faults.mcap_layout import (
     CHUNK_INDEX,
     DATA_END,
     FOOTER,
+    INDEXES,
     MESSAGE_INDEX,
     SCHEMA,
     STATISTICS,
@@ -79,6 +80,18 @@ def indexes_removed(data: bytes, rng: Rng) -> bytes:
     """Leave out some of the indexes, of messages or of chunks or both."""
     left_out = [{MESSAGE_INDEX}, {CHUNK_INDEX}, {MESSAGE_INDEX, CHUNK_INDEX}, {STATISTICS}][int(rng.integers(4))]
     return closed([each for each in parsed(data) if each.opcode not in left_out])
+
+
+def chunk_damaged(data: bytes, rng: Rng) -> bytes | None:
+    """Change bytes of what the first chunk, or one in the middle, holds."""
+    records = parsed(data)
+    found = [index for index, each in enumerate(records) if each.opcode == CHUNK]
+    if not found:
+        return None
+    index = found[0 if rng.uniform() < 0.5 else len(found) // 2]
+    chunk = Chunk.of(records[index])
+    records[index] = replace(chunk, data=_noisy(chunk.data, rng)).record()
+    return written(records)
 
 
 def chunk_crc_wrong(data: bytes, rng: Rng) -> bytes | None:
@@ -170,6 +183,13 @@ def schema_altered(data: bytes, rng: Rng) -> bytes:
     return _schemas(data, lambda name, kind, text: (name, kind, alter(text)))
 
 
+def schema_encoding_changed(data: bytes, rng: Rng) -> bytes:
+    """Let the schema of maps be in a language that is not known, or in another one."""
+    encodings = (b"ros3msg", b"", b"ros2idl", b"jsonschema", b"protobuf", b"\xff\x00", b"ros1msg", b"z" * 300)
+    encoding = encodings[int(rng.integers(len(encodings)))]
+    return _schemas(data, lambda name, _, text: (name, encoding, text))
+
+
 def channel_encoding_changed(data: bytes, rng: Rng) -> bytes:
     """Let a channel of maps say that it is encoded otherwise."""
     encodings = (b"json", b"", b"cdr2", b"ros1", b"cdr", b"protobuf")
@@ -182,6 +202,14 @@ def channel_encoding_changed(data: bytes, rng: Rng) -> bytes:
         return content if name != topic else content[:end] + _text(encoding) + content[after:]
 
     return _contents(data, CHANNEL, change)
+
+
+def data_end_wrong(data: bytes, rng: Rng) -> bytes:
+    """Let the checksum of all data be another, or be missing with its record."""
+    records = parsed(data)
+    end = next(index for index, each in enumerate(records) if each.opcode == DATA_END)
+    other = [replace(records[end], content=rng.bytes(4))] if rng.uniform() < 0.7 else []
+    return written([*records[:end], *other, *records[end + 1 :]])
 
 
 def footer_wrong(data: bytes, rng: Rng) -> bytes:
@@ -213,7 +241,7 @@ def _contents(data: bytes, opcode: int, change: Callable[[bytes], bytes]) -> byt
 
 def _everywhere(data: bytes, change: Callable[[Records], Records]) -> bytes:
     """Change records within chunks and outside of them. Indexes are left out, for offsets are others then."""
-    outside = change([each for each in parsed(data) if each.opcode not in {MESSAGE_INDEX, CHUNK_INDEX, STATISTICS}])
+    outside = change([each for each in parsed(data) if each.opcode not in INDEXES])
     return closed([Chunk.of(each).with_records(change).record() if each.opcode == CHUNK else each for each in outside])
 
 

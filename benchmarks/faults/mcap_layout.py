@@ -18,9 +18,22 @@ from replay.sources.mcap_records import (
     STATISTICS,
 )
 
-__all__ = ["CHANNEL", "CHUNK", "CHUNK_INDEX", "FOOTER", "MESSAGE_INDEX", "SCHEMA", "STATISTICS", "Chunk", "Record"]
+__all__ = [
+    "CHANNEL",
+    "CHUNK",
+    "CHUNK_INDEX",
+    "FOOTER",
+    "INDEXES",
+    "MESSAGE_INDEX",
+    "SCHEMA",
+    "STATISTICS",
+    "Chunk",
+    "Record",
+]
 
 DATA_END = 15
+INDEXES = {MESSAGE_INDEX, CHUNK_INDEX, STATISTICS}
+"""What says where things are, and is wrong once they are elsewhere."""
 _HEAD = struct.Struct("<BQ")
 _FOOTER = struct.Struct("<QQI")
 _CHUNK = struct.Struct("<QQQI")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,8 @@ from replay.events import Merged
 MOST_M, MOST_DEG = 0.30, 3.0
 """Two cells: what may come of a map of which a part is damaged."""
 _LEAST_ALIKE = 0.8
-_LEAST_ALIKE_SHIFTED = 0.7
+_LEAST_ALIKE_IN_PIECE, _LEAST_PIECE = 0.95, 0.25
+_SHIFTS = 8
 
 
 def misplaced(event: Merged, latest: Mapping[str, Grid]) -> list[str]:
@@ -38,7 +39,23 @@ def misplaced(event: Merged, latest: Mapping[str, Grid]) -> list[str]:
 
 def error_of(reference: str, target: Grid, robot: str, source: Grid, target_from_source: Sim2) -> str:
     """Return what is wrong with a placement; "" if nothing."""
-    true_target, true_source = _shown(target, reference), _shown(source, robot)
+    found = [
+        _error(true_target, target, true_source, source, target_from_source)
+        for true_target in _shown(target, reference)
+        for true_source in _shown(source, robot)
+    ]
+    return "" if "" in found else found[0]
+
+
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """Whose map a grid shows, or a piece of it, and by how many columns and rows it is shifted."""
+
+    robot: str
+    shift: tuple[int, int] = (0, 0)
+
+
+def _error(true_target: _Shown, target: Grid, true_source: _Shown, source: Grid, target_from_source: Sim2) -> str:
     if (true_target.robot == STRANGER) != (true_source.robot == STRANGER):
         return f"though its map is of {true_source.robot} and the reference's of {true_target.robot}"
     cell = np.array([[source.cols / 2, source.rows / 2]])
@@ -54,26 +71,18 @@ def error_of(reference: str, target: Grid, robot: str, source: Grid, target_from
     return "" if off_m <= MOST_M and off_deg <= MOST_DEG else f"{off_m:.2f} m and {off_deg:.1f}° from where it lies"
 
 
-@dataclass(frozen=True, slots=True)
-class _Shown:
-    """Whose map a grid shows, and by how many columns and rows it is shifted."""
-
-    robot: str
-    shift: tuple[int, int] = (0, 0)
-
-
-def _shown(grid: Grid, name: str) -> _Shown:
+def _shown(grid: Grid, name: str) -> list[_Shown]:
     """Return what a grid shows: told by its cells or, where they are like nobody's, by its name.
 
-    Damage can move bytes, and so shift the cells of a map, or put them into the message of another robot.
+    Damage can move bytes, and so shift some of the cells of a map, or put cells of another robot's map there.
+    Such a grid shows several things, and lies where any of them does.
     """
     alike = {robot: _alike(grid, robot) for robot in FLOOR_FROM_MAP}
     best = max(alike, key=lambda robot: alike[robot])
     if alike[best] >= _LEAST_ALIKE:
-        return _Shown(best)
-    share, shifted = max((_shifted(grid, robot) for robot in FLOOR_FROM_MAP), key=lambda item: item[0])
+        return [_Shown(best)]
     known = name if name in FLOOR_FROM_MAP else best
-    return shifted if share >= _LEAST_ALIKE_SHIFTED else _Shown(known)
+    return [each for robot in FLOOR_FROM_MAP for each in _pieces(grid, robot)] or [_Shown(known)]
 
 
 def _alike(grid: Grid, robot: str) -> float:
@@ -91,22 +100,50 @@ def _same(cells: np.ndarray, others: np.ndarray) -> float:
     return float(np.mean(cells[known] == others[known])) if known.any() else 0.0
 
 
-def _shifted(grid: Grid, robot: str) -> tuple[float, _Shown]:
-    """Return which share of a grid's known cells is of a robot's map that was moved along its bytes, and how far."""
-    best = 0.0, _Shown(robot)
+def _pieces(grid: Grid, robot: str) -> Iterator[_Shown]:
+    """Yield by how much pieces of a robot's map are shifted that a grid shows from one byte to another."""
     flat = grid.cells.reshape(-1)
     for cells in _all_cells(robot):
         if cells.shape != grid.cells.shape or not (flat >= 0).any():
             continue
-        free, walls = (_correlated(flat == value, cells.reshape(-1) == value) for value in (0, 100))
-        same = free + walls
-        by = int(np.argmax(same))
-        by = by - len(same) if by > len(same) // 2 else by
-        rows = round(by / grid.cols)
-        share = float(np.max(same)) / int((flat >= 0).sum())
-        if share > best[0]:
-            best = share, _Shown(robot, (by - rows * grid.cols, rows))
-    return best
+        for by in _likely_shifts(flat, cells.reshape(-1)):
+            moved = _moved(cells.reshape(-1), by)
+            if _piece(flat, moved) >= _LEAST_PIECE:
+                rows = round(by / grid.cols)
+                yield _Shown(robot, (by - rows * grid.cols, rows))
+
+
+def _piece(flat: np.ndarray, other: np.ndarray) -> float:
+    """Return which share of the known cells is in the longest stretch in which both are nearly the same."""
+    known = (flat >= 0) | (other >= 0)
+    # The stretch with the largest sum is one in which at least the wanted share agrees.
+    against = _LEAST_ALIKE_IN_PIECE / (1 - _LEAST_ALIKE_IN_PIECE)
+    sums = np.concatenate([[0.0], np.cumsum(np.where(flat == other, 1.0, -against) * known)])
+    gains = sums - np.minimum.accumulate(sums)
+    end = int(np.argmax(gains))
+    begin = int(np.argmin(sums[: end + 1]))
+    return float(np.sum(flat[begin:end] >= 0) / np.sum(flat >= 0))
+
+
+def _moved(flat: np.ndarray, by: int) -> np.ndarray:
+    """Return cells moved along the bytes, with unknown ones where there are none."""
+    moved = np.full_like(flat, -1)
+    if by >= 0:
+        moved[by:] = flat[: len(flat) - by]
+    else:
+        moved[:by] = flat[-by:]
+    return moved
+
+
+def _likely_shifts(flat: np.ndarray, other: np.ndarray) -> list[int]:
+    """Return the shifts at which most known cells, or most walls, are the same, and none.
+
+    Walls are narrow: of a piece of a map they tell by how much it is shifted, where free space says little.
+    """
+    walls = _correlated(flat == 100, other == 100)
+    known = walls + _correlated(flat == 0, other == 0)
+    best = (int(by) for same in (walls, known) for by in np.argsort(same, kind="stable")[-_SHIFTS:])
+    return sorted({0, *(by - len(walls) if by >= len(flat) else by for by in best)})
 
 
 def _correlated(one: np.ndarray, other: np.ndarray) -> np.ndarray:

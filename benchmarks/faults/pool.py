@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from queue import SimpleQueue
 from select import select
 from threading import Lock
+from time import perf_counter
 from typing import IO
 
 from benchmarks.faults.cases import Task
@@ -30,6 +31,7 @@ class Done:
 
     task: Task
     judged: Judged | None
+    took_s: float = 0.0
 
 
 class Worker:
@@ -127,7 +129,8 @@ def run_all(tasks: Iterable[Task], jobs: int, new_worker: Callable[[], Worker] =
                     task = next(source, None)
                 if task is None:
                     return
-                done.put(Done(task, worker.run(task)))
+                begin_s = perf_counter()
+                done.put(Done(task, worker.run(task), perf_counter() - begin_s))
         finally:
             worker.close()
             done.put(None)

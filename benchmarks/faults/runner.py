@@ -102,23 +102,23 @@ class Ran:
     program: str = ""
 
 
-def run(path: Path, *, program: bool = False) -> Ran:
+def run(path: Path, *, program: bool = False, max_memory_bytes: int | None = None) -> Ran:
     """Replay a recording; with ``program`` also by the command line."""
+    options = RunOptions((RunPath(None, path),), images="none", max_memory_bytes=max_memory_bytes)
     try:
-        ran = _replayed(path)
+        ran = _replayed(options)
     except ReplayError as error:
         ran = Ran(error=str(error), is_usage=isinstance(error, UsageError))
     except Exception:  # noqa: BLE001 - whatever else comes is what is looked for
         ran = Ran(crash=traceback.format_exc())
-    return replace(ran, program=_by_command_line(path, ran)) if program and not ran.crash else ran
+    return replace(ran, program=_by_command_line(options, ran)) if program and not ran.crash else ran
 
 
-def _replayed(path: Path) -> Ran:
+def _replayed(options: RunOptions) -> Ran:
     seen: list[RawMessage] = []
     named: list[Named] = []
     wrong: dict[str, None] = {}
     last: Merged | None = None
-    options = _options(path)
     with _remembering() as mergers, open_plan(options) as plan:
         unused = _unused(plan)
         topics = {(each.name, each.msgtype): each.message_count for info in plan.infos for each in info.topics}
@@ -144,10 +144,6 @@ def _unused(plan: Plan) -> int:
     """Return how many messages are on map topics that the terminal says are not used."""
     names = plan.unused_topics()
     return sum(topic.message_count for info in plan.infos for topic in info.topics if topic.name in names)
-
-
-def _options(path: Path) -> RunOptions:
-    return RunOptions((RunPath(None, path),), images="none")
 
 
 def _merged(last: Merged | None) -> tuple[str, ...]:
@@ -195,13 +191,16 @@ def _remembering() -> Iterator[list[RememberingMerger]]:
         yield made
 
 
-def _by_command_line(path: Path, expected: Ran) -> str:
+def _by_command_line(options: RunOptions, expected: Ran) -> str:
     """Return what the command line does otherwise than a run did; "" if nothing."""
     from replay.cli import main
 
+    path = options.runs[0].path
     output = path.parent / "merged_by_program.mcap"
     said, told = io.StringIO(), io.StringIO()
     arguments = ["merge", str(path), "-o", str(output), "--no-rrd", "--images", "none", "--json"]
+    if options.max_memory_bytes is not None:
+        arguments += ["--max-memory", str(options.max_memory_bytes)]
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(told), _remembering():
         status = main(arguments)
     lines = told.getvalue().splitlines()

@@ -6,8 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from benchmarks.faults import bag_damage as bag
+from benchmarks.faults import bombs
 from benchmarks.faults import bytes_damage as raw
 from benchmarks.faults import db3_damage as db3
+from benchmarks.faults import degenerate_maps as odd
 from benchmarks.faults import folder_damage as folder
 from benchmarks.faults import mcap_damage as mcap
 from benchmarks.faults import message_damage as told
@@ -25,12 +27,16 @@ class Variant:
     ----------
     told
         What was recorded, where the messages are the fault; None if they are those of the undamaged recording.
+    max_memory_bytes
+        What the program is told that a map may take; None for nothing.
     """
 
     recording: Recording
     told: tuple[Message, ...] | None = None
+    max_memory_bytes: int | None = None
 
 
+_MEMORY_BYTES = 20_000_000
 _NOBODY_COUNTS = {"mcap_no_summary": "nothing in the file counts its messages"}
 
 Change = Callable[[str, Rng], Variant | None]
@@ -80,6 +86,16 @@ def _bytes(
     return Fault(varied, fits, silent_in or {}, is_rewritten)
 
 
+def _renamed(change: Callable[[bytes, Rng], bytes], name: str) -> Fault:
+    """Return a fault of the bytes of a ROS 1 bag that has another name, too."""
+
+    def varied(kind: str, rng: Rng) -> Variant:
+        (data,) = undamaged(kind).files.values()
+        return Variant(Recording({name: change(data, rng)}, name))
+
+    return Fault(varied, lambda kind: kind.container == "bag", {})
+
+
 def _beside(change: Callable[[str, bytes, Rng], Mapping[str, bytes]]) -> Fault:
     """Return a fault that leaves a file beside a database."""
 
@@ -106,12 +122,27 @@ def _folder(
     return Fault(varied, lambda kind: kind.is_folder and (kind.is_split or not only_split), silent_in or {})
 
 
-def _messages(change: Callable[[Sequence[Message], Rng], Sequence[Message]]) -> Fault:
+def _compressed() -> Fault:
+    """Return the fault of compressed data that grows beyond all measure."""
+
+    def varied(name: str, rng: Rng) -> Variant:
+        recording = undamaged(name)
+        names = recording.data_names()
+        chosen = names[int(rng.integers(len(names)))]
+        data = bombs.planted(FORMATS[name], recording.files[chosen], rng)
+        return Variant(Recording({**recording.files, chosen: data}, recording.main))
+
+    return Fault(varied, lambda kind: bool(kind.compression), {}, is_rewritten=True)
+
+
+def _messages(
+    change: Callable[[Sequence[Message], Rng], Sequence[Message]], max_memory_bytes: int | None = None
+) -> Fault:
     """Return a fault of the messages in a recording that is whole."""
 
     def varied(name: str, rng: Rng) -> Variant:
         recorded = tuple(change(messages(), rng))
-        return Variant(FORMATS[name].recorded(recorded), recorded)
+        return Variant(FORMATS[name].recorded(recorded), recorded, max_memory_bytes)
 
     return Fault(varied, lambda _: True, {})
 
@@ -139,6 +170,7 @@ FAULTS: Mapping[str, Fault] = {
     "with_lf": _bytes(raw.with_lf),
     "as_text": _bytes(raw.as_text),
     "twice": _bytes(raw.twice),
+    "bomb": _compressed(),
     # records of MCAP files
     "mcap_records_swapped": _bytes(mcap.records_swapped, "mcap", _NOBODY_COUNTS),
     "mcap_record_doubled": _bytes(mcap.record_doubled, "mcap"),
@@ -148,6 +180,7 @@ FAULTS: Mapping[str, Fault] = {
     "mcap_opcode_changed": _bytes(mcap.opcode_changed, "mcap", _NOBODY_COUNTS),
     "mcap_summary_removed": _bytes(mcap.summary_removed, "mcap"),
     "mcap_indexes_removed": _bytes(mcap.indexes_removed, "mcap"),
+    "mcap_chunk_damaged": _bytes(mcap.chunk_damaged, "mcap"),
     "mcap_chunk_crc_wrong": _bytes(mcap.chunk_crc_wrong, "mcap"),
     "mcap_chunk_size_wrong": _bytes(mcap.chunk_size_wrong, "mcap"),
     "mcap_chunk_compression_wrong": _bytes(mcap.chunk_compression_wrong, "mcap"),
@@ -159,7 +192,9 @@ FAULTS: Mapping[str, Fault] = {
     "mcap_schema_removed": _bytes(mcap.schema_removed, "mcap"),
     "mcap_schema_emptied": _bytes(mcap.schema_emptied, "mcap"),
     "mcap_schema_altered": _bytes(mcap.schema_altered, "mcap"),
+    "mcap_schema_encoding_changed": _bytes(mcap.schema_encoding_changed, "mcap"),
     "mcap_channel_encoding_changed": _bytes(mcap.channel_encoding_changed, "mcap"),
+    "mcap_data_end_wrong": _bytes(mcap.data_end_wrong, "mcap"),
     "mcap_footer_wrong": _bytes(mcap.footer_wrong, "mcap"),
     # records of ROS 1 bags
     "bag_records_swapped": _bytes(bag.records_swapped, "bag"),
@@ -168,7 +203,9 @@ FAULTS: Mapping[str, Fault] = {
     "bag_cut_between_records": _bytes(bag.cut_between_records, "bag"),
     "bag_length_inflated": _bytes(bag.length_inflated, "bag"),
     "bag_without_index": _bytes(bag.without_index, "bag"),
+    "bag_active": _renamed(bag.without_index, "run.bag.active"),
     "bag_header_wrong": _bytes(bag.header_wrong, "bag"),
+    "bag_chunk_damaged": _bytes(bag.chunk_damaged, "bag"),
     "bag_chunk_size_wrong": _bytes(bag.chunk_size_wrong, "bag"),
     "bag_chunk_compression_wrong": _bytes(bag.chunk_compression_wrong, "bag"),
     "bag_index_falsified": _bytes(bag.index_falsified, "bag"),
@@ -185,6 +222,7 @@ FAULTS: Mapping[str, Fault] = {
     "db3_topic_wrong": _bytes(db3.topic_wrong, "db3"),
     "db3_topic_removed": _bytes(db3.topic_removed, "db3"),
     "db3_table_wrong": _bytes(db3.table_wrong, "db3"),
+    "db3_schema_wrong": _bytes(db3.schema_wrong, "db3"),
     "db3_index_removed": _bytes(db3.index_removed, "db3"),
     "db3_page_zeroed": _bytes(db3.page_zeroed, "db3"),
     "db3_pages_swapped": _bytes(db3.pages_swapped, "db3"),
@@ -222,4 +260,13 @@ FAULTS: Mapping[str, Fault] = {
     "message_update_wrong": _messages(told.update_wrong),
     "message_updates_first": _messages(told.updates_first),
     "message_float_noise": _messages(told.float_noise),
+    "message_over_memory": _messages(odd.over_memory, _MEMORY_BYTES),
+    # maps that tell nothing, or the wrong thing
+    "maps_all_free": _messages(odd.all_free),
+    "maps_of_one_cell": _messages(odd.one_cell),
+    "maps_of_one_row": _messages(odd.one_row),
+    "maps_of_one_wall": _messages(odd.one_wall),
+    "maps_symmetric": _messages(odd.symmetric),
+    "maps_identical": _messages(odd.identical),
+    "maps_mirrored": _messages(odd.mirrored),
 }

@@ -25,12 +25,14 @@ from benchmarks.faults.world import FLOOR_FROM_MAP, messages
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE
 
 MEMORY_BYTES = 3 << 30
+FILE_BYTES = 1 << 30
 READY = "ready"
 
 
 def main() -> None:
     """Answer tasks until there are no more."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     # What libraries say must not get among the answers.
     answers = os.fdopen(os.dup(1), "wb")
@@ -96,7 +98,7 @@ def undamaged_run(name: str) -> Ran:
 def _run_in(folder: Path, variant: Variant, task: Task) -> Judged:
     path = variant.recording.write(folder)
     before = {each: each.read_bytes() for each in _files(path)}
-    ran = run(path, program=task.program)
+    ran = run(path, program=task.program, max_memory_bytes=variant.max_memory_bytes)
     judged = judge(ran, expected_of(task.case, variant))
     if before != {each: each.read_bytes() for each in _files(path)}:
         raise AssertionError("the recording was changed")

@@ -46,6 +46,13 @@ OTHER_FLAT: tuple[Box, ...] = (
     (6.9, 0.9, 7.8, 1.2),
     (0.6, 0.6, 1.2, 1.5),
 )
+BARE_ROOM = FLAT[:4]
+SQUARE_ROOM: tuple[Box, ...] = (
+    (1.35, -0.15, 7.65, 0.0),
+    (1.35, 6.0, 7.65, 6.15),
+    (1.35, 0.0, 1.5, 6.0),
+    (7.5, 0.0, 7.65, 6.0),
+)
 FLOOR_FROM_MAP: Mapping[str, Sim2] = {
     "r1": Sim2(-1.0, -1.0),
     "r2": Sim2(10.2, 1.3, 2.2),
@@ -72,21 +79,26 @@ def robot_of(topic: str) -> str:
     return topic.split("/")[1]
 
 
-@functools.cache
 def robot_map(robot: str, part: int) -> Grid:
     """Return one of a robot's maps, known up to so far from the west."""
-    walls = OTHER_FLAT if robot == STRANGER else FLAT
+    return drawn_map(robot, part, OTHER_FLAT if robot == STRANGER else FLAT)
+
+
+@functools.cache
+def drawn_map(robot: str, part: int, walls: tuple[Box, ...]) -> Grid:
+    """Return a map of a building in the frame of a robot: as far as its walls reach, and known up to its part."""
     rows, cols = round(SIZE_M[1] / RESOLUTION_M), round(SIZE_M[0] / RESOLUTION_M)
     row, col = np.indices((rows, cols)).reshape(2, -1)
     # Cells whose centres stray by up to half a cell, as no robot's cells lie along a wall exactly.
     stray = np.random.default_rng([part, *robot.encode()]).uniform(-0.3, 0.3, (rows * cols, 2))
     centres_m = (np.stack([col + 0.5, row + 0.5], axis=1) + stray) * RESOLUTION_M
     x_m, y_m = FLOOR_FROM_MAP[robot].apply(centres_m).T
-    until_m = PARTS_M[part]
+    until_m = min(PARTS_M[part], max(wall[2] for wall in walls) - RESOLUTION_M)
+    from_m = min(wall[0] for wall in walls) + RESOLUTION_M
     cells = np.full(len(x_m), -1, np.int8)
-    cells[(x_m >= 0.0) & (x_m < until_m) & (y_m >= 0.0) & (y_m < 6.0)] = 0
+    cells[(x_m >= from_m) & (x_m < until_m) & (y_m >= 0.0) & (y_m < 6.0)] = 0
     for x0_m, y0_m, x1_m, y1_m in walls:
-        cells[(x_m >= x0_m) & (x_m < min(x1_m, until_m)) & (y_m >= y0_m) & (y_m < y1_m)] = 100
+        cells[(x_m >= x0_m) & (x_m < min(x1_m, PARTS_M[part])) & (y_m >= y0_m) & (y_m < y1_m)] = 100
     return Grid(cells.reshape(rows, cols), RESOLUTION_M)
 
 

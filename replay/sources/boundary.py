@@ -33,12 +33,15 @@ TEXT_MODE = (
     " (Git: mark it `binary` in .gitattributes)"
 )
 
+_NO_SPACE = "free space in the temporary folder, or name another in the environment variable TMPDIR"
 # The machine's limits, which say nothing about the recording.
 _LIMITS = {
     errno.EMFILE: "raise the limit (`ulimit -n`), or give fewer recordings at once",
     errno.ENFILE: "close other programs, or raise the limit of the system",
     # Only temporary copies are written: decompressed, or with what was beside them.
-    errno.ENOSPC: "free space in the temporary folder, or name another in the environment variable TMPDIR",
+    errno.ENOSPC: _NO_SPACE,
+    errno.EDQUOT: _NO_SPACE,
+    errno.EFBIG: f"raise the limit (`ulimit -f`), or {_NO_SPACE}",
 }
 
 
@@ -66,6 +69,9 @@ def _line(path: Path, error: Exception, part: str) -> str:
         return f"{path}: it cannot be read: {error.strerror}; {_LIMITS[error.errno]} and try again"
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename or path}: {error.strerror}; expected a recording that can be read"
+    if isinstance(error, MemoryError):
+        what = f"{part} takes" if part else "it takes"
+        return f"{path}: {what} more memory than there is; close other programs, or raise the limit (`ulimit -v`)"
     name, text = type(error).__name__, " ".join(str(error).split())
     found = f"{name}: {text}" if text else name
     what = f"{part} cannot be read" if part else "it cannot be read"

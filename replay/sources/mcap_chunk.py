@@ -91,9 +91,14 @@ def chunk_content(file: RecordFile, start: int) -> tuple[bytes, bool]:
     head = chunk_head(content)
     if head is None or head.head_bytes + head.data_bytes != len(content):
         raise BadPart(SkipCause.DAMAGED, f"the lengths in it do not fit its {len(content)} bytes")
-    plain = _decompressed(head.compression, content[head.head_bytes :], file)
-    if len(plain) > file.most_bytes:
-        raise _too_large(file)
+    # More than it should have is wrong as soon as it is seen: little data may grow to very much.
+    most_bytes = min(head.size, file.most_bytes)
+    pieces = list(_decompressed(head.compression, content[head.head_bytes :], most_bytes))
+    if head.compression and sum(map(len, pieces)) > most_bytes:
+        if most_bytes == file.most_bytes:
+            raise _too_large(file)
+        raise BadPart(SkipCause.DAMAGED, f"it has more than {head.size} bytes, which it should have")
+    plain = b"".join(pieces)
     if head.crc not in {0, zlib.crc32(plain)}:
         raise BadPart(SkipCause.WRONG_CHECKSUM, "its checksum (CRC) is wrong")
     if len(plain) != head.size:
@@ -116,7 +121,7 @@ def cut_chunk_content(file: RecordFile, start: int) -> bytes:
     file.file.seek(found[0].content + head.head_bytes)
     # without the zeros at the end of the file, which a decompressor would take for data
     data = file.file.read(max(0, min(file.written - file.file.tell(), file.most_bytes)))
-    plain = _decompressed(head.compression, data, file)
+    plain = b"".join(_decompressed(head.compression, data, file.most_bytes))
     end = 0
     for record in _records(plain):
         if record.end > len(plain):
@@ -159,29 +164,28 @@ def _too_large(file: RecordFile) -> BadPart:
     return BadPart(SkipCause.OVER_MEMORY, f"it has more than {file.most_bytes} bytes")
 
 
-def _decompressed(compression: bytes, data: bytes, file: RecordFile) -> bytes:
-    """Return what is in the data, up to a little more than the largest chunk that is read."""
+def _decompressed(compression: bytes, data: bytes, most_bytes: int) -> Iterator[bytes]:
+    """Yield what is in the data in pieces, up to a little more than so many bytes; what is not compressed at once."""
     from zstandard import ZstdError
 
     if compression not in _COMPRESSIONS:
         name = compression.decode(errors="replace")
         raise BadPart(SkipCause.DAMAGED, f"its compression is '{name}', not lz4, zstd or none")
     if not compression:
-        return data
+        yield data
+        return
     steps = _zstd_steps(data) if compression == b"zstd" else _lz4_steps(data)
-    plain: list[bytes] = []
-    left = file.most_bytes
+    left = most_bytes
     try:
         for step in steps:
-            plain.append(step)
+            yield step
             left -= len(step)
             if left < 0:
-                break
+                return
     # RuntimeError is lz4's
     except (ZstdError, RuntimeError) as error:
         found = " ".join(str(error).split())
         raise BadPart(SkipCause.DAMAGED, f"it cannot be decompressed ({found})") from error
-    return b"".join(plain)
 
 
 def _zstd_steps(data: bytes) -> Iterator[bytes]:

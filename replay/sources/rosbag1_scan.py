@@ -130,12 +130,14 @@ class Scan:
         self._times_ns: dict[int, tuple[int, int]] = {}
         self._contradictory: set[int] = set()
         self._open: _OpenChunk | None = None
+        self._listed_chunks: set[int] = set()
         self._pass(file.start)
         self._finish_chunk()
         # which the pass may have missed while it looked for the next record
         for record in index_section(file.file, file.index_pos if self._has_all_chunks else 0):
             if record.end <= file.size:
                 self._take(record)
+        self._name_missing_chunks()
         self._drop_unknown()
 
     @property
@@ -210,6 +212,8 @@ class Scan:
             self._open.take_index(record.number(b"conn"), rows)
         elif record.op == CONNECTION and record.end - record.data <= _MOST_DEFINITION_BYTES:
             self._connect(record, self._bytes(record.data, record.end - record.data))
+        elif record.op == CHUNK_INFO:
+            self._listed_chunks.add(record.number(b"chunk_pos"))
 
     def _connect(self, record: Record, data: bytes) -> None:
         """Take in what a connection is; one that two records describe differently is not used."""
@@ -282,6 +286,16 @@ class Scan:
         # of a connection that is not known yet, it may be
         if topic is None or topic.msgtype in _USED_TYPES or key in self._kept:
             self._found.setdefault(key, array("Q")).extend(entry[:3])
+
+    def _name_missing_chunks(self) -> None:
+        """Name chunks that the index lists and the pass did not meet, unless something else may have been these.
+
+        Where bytes are missing in the file, one chunk may end where another one should, and that is whole to look at.
+        """
+        missing = len(self._listed_chunks) - len(self.chunks)
+        if missing > 0 and all(loss.messages is not None for loss in self._losses.all):
+            detail = f"it lists {len(self._listed_chunks)} chunks, {len(self.chunks)} were found"
+            self._losses.add(Loss(SkipCause.DAMAGED, "the index", detail))
 
     def _drop_unknown(self) -> None:
         """Leave out the messages of which nothing, or nothing that can be trusted, says what they are."""

@@ -31,6 +31,7 @@ _HEAD_BYTES = 16
 
 
 _FOREIGN = (*COMMON, ZstdError)
+_BEGINNINGS = (b"SQLite", b"\x89MCAP")
 
 
 class Rosbag2Folder(Closing):
@@ -187,7 +188,7 @@ class _FilePart:
             return self._path, True
         folder = Path(stack.enter_context(TemporaryDirectory(prefix="replay-")))
         plain = folder / self._path.name.removesuffix(".zstd")
-        return plain, decompress_file(self._path, plain)
+        return plain, decompress_file(self._path, plain, _BEGINNINGS)
 
     def _source(self, plain: Path, *, is_whole: bool) -> Source:
         head = _head(plain)

@@ -7,6 +7,7 @@ word.
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 if sys.version_info >= (3, 14):
@@ -21,8 +22,13 @@ _PIECE_BYTES = 1 << 20
 ZstdError = zstd.ZstdError
 
 
-def decompress_file(source: Path, target: Path) -> bool:
+def decompress_file(source: Path, target: Path, beginnings: Sequence[bytes] = (b"",)) -> bool:
     """Decompress a file as a stream.
+
+    Parameters
+    ----------
+    beginnings
+        What it may begin with. Of what begins otherwise, and may grow without end, only the beginning is decompressed.
 
     Returns
     -------
@@ -38,7 +44,11 @@ def decompress_file(source: Path, target: Path) -> bool:
         decompressor = zstd.ZstdDecompressor()
         piece = compressed.read(_PIECE_BYTES)
         while piece or not (decompressor.needs_input or decompressor.eof):
-            plain.write(decompressor.decompress(piece, _PIECE_BYTES))
+            output = decompressor.decompress(piece, _PIECE_BYTES)
+            is_first = plain.tell() == 0
+            plain.write(output)
+            if is_first and not any(each.startswith(output[: len(each)]) for each in beginnings):
+                return True
             if decompressor.eof:
                 piece = decompressor.unused_data or compressed.read(_PIECE_BYTES)
                 # there may be several frames, one after the other

@@ -130,6 +130,14 @@ class TestRefusals:
         with pytest.raises(InputError, match=r"run.mcap: no map, only std_msgs/msg/String; expected a topic of type"):
             topics(info_of("/chatter", msgtype="std_msgs/msg/String"))
 
+    def test_types_that_are_no_names(self) -> None:
+        """What is in place of them may be a whole definition, if the pages of a database are mixed up."""
+        with pytest.raises(InputError) as refused:
+            topics(info_of("/chatter", msgtype="int32 sec\nuint32 nanosec\n" * 50))
+        assert str(refused.value).startswith(r"run.mcap: no map, only int32 sec\nuint32 nanosec\n")
+        assert "…; expected a topic of type" in str(refused.value)
+        assert len(str(refused.value)) < 300
+
     def test_no_message(self) -> None:
         with pytest.raises(InputError):
             topics(info_of())

@@ -461,7 +461,9 @@ def test_a_chunk_that_is_larger_than_is_read_is_named(tmp_path: Path, compressio
     with McapFile(path, most_bytes=1 << 20) as source:
         assert [each.log_time_ns for each in source.messages(["/r1/map"])] == [5, 6]
         (loss,) = source.losses.all
-    assert (loss.cause, loss.place) == (SkipCause.OVER_MEMORY, f"the chunk at byte {path.read_bytes().index(bomb)}")
+    # More than it should have is given up on before it is more than is read.
+    cause = SkipCause.DAMAGED if compression and promised < 1 << 20 else SkipCause.OVER_MEMORY
+    assert (loss.cause, loss.place) == (cause, f"the chunk at byte {path.read_bytes().index(bomb)}")
 
 
 def test_a_message_that_is_larger_than_is_read_is_named(tmp_path: Path) -> None:

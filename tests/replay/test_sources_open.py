@@ -158,9 +158,20 @@ def test_errors_of_libraries_become_one_line(make: Callable[[], Exception]) -> N
     assert caught.value.__cause__ is error
 
 
+def test_too_little_memory_is_not_blamed_on_the_recording() -> None:
+    with pytest.raises(InputError) as caught, translated(Path("some/recording"), part="the chunk at byte 7"):
+        raise MemoryError
+    assert str(caught.value).startswith("some/recording: the chunk at byte 7 takes more memory than there is; ")
+
+
 @pytest.mark.parametrize(
     ("number", "remedy"),
-    [(errno.EMFILE, "`ulimit -n`"), (errno.ENFILE, "raise the limit"), (errno.ENOSPC, "TMPDIR")],
+    [
+        (errno.EMFILE, "`ulimit -n`"),
+        (errno.ENFILE, "raise the limit"),
+        (errno.ENOSPC, "TMPDIR"),
+        (errno.EDQUOT, "TMPDIR"),
+    ],
 )
 def test_limits_of_the_machine_are_not_blamed_on_the_recording(number: int, remedy: str) -> None:
     with pytest.raises(InputError) as caught, translated(Path("some/recording")):

@@ -237,6 +237,24 @@ def test_bytes_that_are_missing_within_a_message(tmp_path: Path) -> None:
     assert {each.place for each in losses} >= {f"the chunk at byte {chunks[0].start}"}
 
 
+@pytest.mark.parametrize("compression", ["bz2", "lz4"])
+def test_bytes_that_are_missing_from_one_chunk_to_the_next(tmp_path: Path, compression: str) -> None:
+    """What is left of two chunks looks like one: the index, which lists both, tells that there was another."""
+    path = _small(tmp_path / "a.bag", compression)
+    chunks = bags_chunks(path)
+    one, other = chunks[:2]
+
+    def remove(data: bytearray) -> None:
+        del data[one.data + 20 : one.data + 20 + other.end - one.end]
+
+    found, losses = _read(_changed(path, remove))
+    assert found == [each for chunk in chunks[2:] for each in chunk.messages]
+    named = [each for each in losses if each.place == "the index"]
+    assert [(each.detail, each.messages) for each in named if each.messages is None] == [
+        (f"it lists {len(chunks)} chunks, {len(chunks) - 1} were found", None)
+    ]
+
+
 def test_a_message_of_which_the_index_says_another_time(tmp_path: Path) -> None:
     path = _small(tmp_path / "a.bag")
     chunk = bags_chunks(path)[1]

@@ -18,6 +18,7 @@ from replay.sources.zstd import MAGIC, zstd
 from tests import bags
 from tests.bags import SECOND, START
 from tests.data_paths import ROOT
+from tests.disks import files_up_to
 from tests.replay.test_sources_open import refused
 
 TOPICS = {each.topic for each in bags.SAMPLE}
@@ -172,6 +173,23 @@ def test_a_compressed_part_that_is_damaged_is_left_out(tmp_path: Path, temporary
     part.write_bytes(data)
     assert _read(path) == (_recorded(_without(2)), [("damaged", part.name, None)])
     assert list(temporary.iterdir()) == []
+
+
+def test_a_compressed_part_that_is_no_recording_is_not_decompressed_to_its_end(tmp_path: Path) -> None:
+    """Some kilobytes may grow to more than any disk takes."""
+    path = bags.write_rosbag2(tmp_path / "bag", compression="file")
+    (part,) = path.glob("*.zstd")
+    part.write_bytes(zstd.compress(bytes(1 << 26)))
+    with files_up_to(1 << 22):
+        refused(path, part.name, "neither MCAP nor SQLite")
+
+
+def test_a_compressed_part_that_grows_beyond_what_a_file_may_have(tmp_path: Path) -> None:
+    path = bags.write_rosbag2(tmp_path / "bag", compression="file")
+    (part,) = path.glob("*.zstd")
+    part.write_bytes(part.read_bytes() + zstd.compress(bytes(1 << 26)))
+    with files_up_to(1 << 22):
+        refused(path, part.name, "`ulimit -f`", "TMPDIR")
 
 
 def test_damage_in_a_compressed_part_names_the_part_not_its_copy(tmp_path: Path) -> None:
