@@ -125,7 +125,7 @@ def open_plan(options: RunOptions) -> Iterator[Plan]:
     with ExitStack() as stack:
         if not options.runs:
             raise UsageError("no recording was given; expected one or more of PATH or ROBOT=PATH")
-        sources = [stack.enter_context(open_source(run.path)) for run in options.runs]
+        sources = [stack.enter_context(open_source(run.path, options.max_memory_bytes)) for run in options.runs]
         yield _plan(sources, options)
 
 

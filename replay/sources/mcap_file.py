@@ -13,7 +13,7 @@ from replay.sources.base import RawMessage, SourceInfo
 from replay.sources.boundary import TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
 from replay.sources.losses import Loss, Losses
-from replay.sources.mcap_chunk import MOST_BYTES, BadPart, chunk_content, cut_chunk_content
+from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content
 from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, indexed_entries, read_summary
 from replay.sources.mcap_records import (
     CHUNK,
@@ -26,6 +26,7 @@ from replay.sources.mcap_records import (
     written_bytes,
 )
 from replay.sources.mcap_scan import Scan, chunk_loss, indexed_counts, scan, unknown_types
+from replay.sources.memory import MOST_BYTES
 from replay.sources.topics import ENCODINGS, topic_table
 from replay.sources.zstd import ZstdError, decompressed_cdr
 

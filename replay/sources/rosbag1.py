@@ -14,7 +14,8 @@ from replay.sources.boundary import COMMON, TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
 from replay.sources.definitions import differing_field
 from replay.sources.losses import Loss, Losses
-from replay.sources.rosbag1_chunks import MOST_BYTES, Chunk, read_chunk, records_in
+from replay.sources.memory import MOST_BYTES
+from replay.sources.rosbag1_chunks import Chunk, read_chunk, records_in
 from replay.sources.rosbag1_index import Index, UnusableIndexError, read_index
 from replay.sources.rosbag1_records import BAG_HEADER, CONNECTION, MESSAGE, Record, record_in, record_of
 from replay.sources.rosbag1_scan import BagFile, Contents, Entry, Scan

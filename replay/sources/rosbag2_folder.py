@@ -18,6 +18,7 @@ from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.losses import Loss, Losses
 from replay.sources.mcap_file import McapFile
 from replay.sources.mcap_scan import Scan
+from replay.sources.memory import MOST_BYTES
 from replay.sources.rosbag2_metadata import METADATA, listed_parts, name_gaps
 from replay.sources.sqlite3_file import Sqlite3File
 from replay.sources.topics import topic_table
@@ -43,9 +44,14 @@ class Rosbag2Folder(Closing):
     A part is open, and decompressed into a temporary directory if it was compressed as a file, only while its contents
     are listed and while its messages are due: a bag may have more parts than files may be open, and be larger
     decompressed than the disk. What is compressed is told by the files themselves, not by the metadata.
+
+    Parameters
+    ----------
+    most_bytes
+        The largest message, or decompressed chunk, that is read.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, most_bytes: int = MOST_BYTES) -> None:
         self.path = path
         self.losses = Losses()
         with translated(path, _FOREIGN):
@@ -56,7 +62,7 @@ class Rosbag2Folder(Closing):
                     f"{path}: this bag has no file with messages, and its {METADATA} lists none; copy its .db3 or "
                     ".mcap files here"
                 )
-            self._parts = _opened_parts(parts, self.losses)
+            self._parts = _opened_parts(parts, self.losses, most_bytes)
             if not listed:
                 name_gaps(parts, self.losses)
                 _check_that_they_belong_together(path, self._parts)
@@ -125,8 +131,9 @@ def merged_by_time(parts: Sequence[Part], topics: Collection[str]) -> Iterator[R
 class _FilePart:
     """One file of a bag, open only while it is read."""
 
-    def __init__(self, path: Path, losses: Losses) -> None:
+    def __init__(self, path: Path, losses: Losses, most_bytes: int) -> None:
         self._path = path
+        self._most_bytes = most_bytes
         self._losses = losses
         self._map_scan: Scan | None = None
         self._resources: set[ExitStack] = set()
@@ -192,9 +199,9 @@ class _FilePart:
     def _source(self, plain: Path, *, is_whole: bool) -> Source:
         head = _head(plain)
         if McapFile.recognises(plain, head):
-            return McapFile(plain, self._path, self._map_scan)
+            return McapFile(plain, self._path, self._map_scan, self._most_bytes)
         if Sqlite3File.recognises(plain, head):
-            return Sqlite3File(plain, self._path)
+            return Sqlite3File(plain, self._path, self._most_bytes)
         if not is_whole:
             raise InputError(
                 f"{self._path}: the file ends early at byte {self._path.stat().st_size}, too early to decompress any "
@@ -205,7 +212,7 @@ class _FilePart:
         )
 
 
-def _opened_parts(paths: Sequence[Path], losses: Losses) -> list[_FilePart]:
+def _opened_parts(paths: Sequence[Path], losses: Losses, most_bytes: int) -> list[_FilePart]:
     """Return the parts that can be read, and name the others.
 
     Raises
@@ -216,7 +223,7 @@ def _opened_parts(paths: Sequence[Path], losses: Losses) -> list[_FilePart]:
     parts, errors = [], []
     for path in paths:
         try:
-            parts.append(_FilePart(path, losses))
+            parts.append(_FilePart(path, losses, most_bytes))
         except InputError as error:
             if isinstance(error.__cause__, OSError):
                 # of the machine, not of the recording

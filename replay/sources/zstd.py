@@ -14,6 +14,8 @@ if sys.version_info >= (3, 14):
 else:
     from backports import zstd
 
+from replay.sources.memory import MOST_BYTES, over_memory
+
 MAGIC = b"\x28\xb5\x2f\xfd"
 
 _PIECE_BYTES = 1 << 20
@@ -48,7 +50,7 @@ def decompress_file(source: Path, target: Path) -> bool:
     return decompressor.eof
 
 
-def decompressed_cdr(data: bytes, most_bytes: int = 1 << 30) -> bytes:
+def decompressed_cdr(data: bytes, most_bytes: int = MOST_BYTES) -> bytes:
     """Return a message in CDR as it was before a bag with message compression stored it.
 
     No message in CDR begins like compressed data, so that this needs no metadata.
@@ -63,7 +65,7 @@ def decompressed_cdr(data: bytes, most_bytes: int = 1 << 30) -> bytes:
     decompressor = zstd.ZstdDecompressor()
     plain = decompressor.decompress(data, most_bytes + 1)
     if len(plain) > most_bytes:
-        raise ZstdError(f"it has more than {most_bytes} bytes")
+        raise ZstdError(over_memory(most_bytes))
     if not decompressor.eof:
         raise ZstdError("it ends early")
     return plain

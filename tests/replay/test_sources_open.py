@@ -202,7 +202,7 @@ def test_a_new_format_is_one_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     path = _written(tmp_path / "a.new", b"NEWFORMAT")
     (tmp_path / "new_format.py").write_text(
         "class NewFile:\n"
-        "    def __init__(self, path): self.path = path\n"
+        "    def __init__(self, path, *, most_bytes): self.path = path\n"
         "    @classmethod\n"
         "    def recognises(cls, path, head): return head.startswith(b'NEWFORMAT')\n"
     )
