@@ -14,7 +14,7 @@ if sys.version_info >= (3, 14):
 else:
     from backports import zstd
 
-from replay.sources.memory import MOST_BYTES, over_memory
+from replay.sources.memory import MOST_BYTES, TooLargeError
 
 MAGIC = b"\x28\xb5\x2f\xfd"
 
@@ -58,14 +58,16 @@ def decompressed_cdr(data: bytes, most_bytes: int = MOST_BYTES) -> bytes:
     Raises
     ------
     ZstdError
-        If it was cut off, is damaged, or would be larger than ``most_bytes``, whatever size it says it has.
+        If it was cut off, or is damaged.
+    TooLargeError
+        If it would be larger than ``most_bytes``, whatever size it says it has.
     """
     if not data.startswith(MAGIC):
         return data
     decompressor = zstd.ZstdDecompressor()
     plain = decompressor.decompress(data, most_bytes + 1)
     if len(plain) > most_bytes:
-        raise ZstdError(over_memory(most_bytes))
+        raise TooLargeError(most_bytes)
     if not decompressor.eof:
         raise ZstdError("it ends early")
     return plain

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mapmerge.grid import Grid
-from tests.bags import write_mcap, write_rosbag1, write_rosbag2
+from tests.bags import write_bare_db3, write_mcap, write_rosbag1, write_rosbag2
 from tests.program import Program
 from tests.runs import flat_map, in_log_order, seen, two_robots, updated
 
@@ -61,8 +61,11 @@ def test_an_update_of_a_map_that_was_not_taken_is_not_put_on_the_one_before(repl
         lambda path, messages: write_mcap(path, messages, compression="zstd", chunk_bytes=100_000),
         lambda path, messages: write_rosbag1(path, messages, "bz2", 100_000),
         lambda path, messages: write_rosbag2(path, messages, storage="mcap"),
+        lambda path, messages: write_rosbag2(path, messages, compression="message"),
+        lambda path, messages: write_rosbag2(path, messages, storage="mcap", compression="message"),
+        write_bare_db3,
     ],
-    ids=["mcap", "bag", "folder"],
+    ids=["mcap", "bag", "folder", "folder of messages", "folder of messages in chunks", "db3"],
 )
 def test_no_more_than_that_is_read_at_once(replay: Program, tmp_path: Path, write) -> None:
     """Its unknown margins do not count for the map, but it would have to be in memory to see that."""

@@ -387,6 +387,24 @@ def _page_of(whole: bytes, data: bytes) -> int:
 # --- whole files
 
 
+@pytest.mark.parametrize("compression", ["none", "message"])
+@pytest.mark.parametrize("is_cut", [False, True], ids=["whole", "cut off"])
+def test_a_message_that_is_larger_than_is_read_is_named(tmp_path: Path, compression: str, is_cut: bool) -> None:
+    messages = [bags.recorded_map("/r1/map", bags.START + number, seed=number) for number in range(6)]
+    messages[2] = bags.recorded_map("/r1/map", bags.START + 2, seed=2, rows=400)
+    path = bags.write_bare_db3(tmp_path / "a.db3", messages, compression=compression)
+    if is_cut:
+        path.write_bytes(path.read_bytes()[:-100])
+    with open_source(path, most_bytes=10_000) as source:
+        found = [each.log_time_ns - bags.START for each in source.messages(["/r1/map"])]
+        losses = [each for each in source.losses.all if each.cause == "over_memory"]
+    assert 2 not in found
+    assert {0, 1, 3} < set(found)
+    (loss,) = losses
+    assert (loss.messages, loss.topic, loss.place) == (1, "/r1/map", "message 3")
+    assert loss.detail.startswith("it has more than 10000 bytes")
+
+
 def test_without_an_index_on_time(tmp_path: Path) -> None:
     path = bags.write_bare_db3(tmp_path / "a.db3")
     with closing(sqlite3.connect(path)) as database:
