@@ -131,7 +131,8 @@ def open_plan(options: RunOptions) -> Iterator[Plan]:
 
 def _plan(sources: list[Source], options: RunOptions) -> Plan:
     infos = tuple(source.info for source in sources)
-    selected = select(options.runs, infos, robots=options.robots, topics=options.topics)
+    losses = [source.losses.all for source in sources]
+    selected = select(options.runs, infos, robots=options.robots, topics=options.topics, losses=losses)
     refuse_unfit([item.robot for item in selected], options.init_poses)
     probes = agreed(_probes(sources, infos, selected, options))
     refuse_recorded_twice(probes, [run.path.name for run in options.runs], options.reorder_window_ns)
