@@ -112,7 +112,8 @@ def _input_arguments(parser: argparse.ArgumentParser) -> None:
         "runs",
         nargs="+",
         metavar="RUN",
-        help="a recording, as PATH or ROBOT=PATH: .bag, ROS 2 bag folder, .db3, .mcap, or a saved map's .yaml",
+        help="a recording, as PATH or ROBOT=PATH: .bag, ROS 2 bag folder, .db3, .mcap, any of these "
+        "files compressed with zstd, or a saved map's .yaml",
     )
     group = parser.add_argument_group("which maps")
     group.add_argument(

@@ -21,13 +21,13 @@ SOURCES: dict[str, str] = {
     "mcap": "replay.sources.mcap_file:McapFile",
     "rosbag2": "replay.sources.rosbag2_folder:Rosbag2Folder",
     "sqlite3": "replay.sources.sqlite3_file:Sqlite3File",
+    "zstd": "replay.sources.compressed_file:CompressedFile",
     "map_server": "replay.sources.map_server:SavedMap",
 }
 
 _HEAD_BYTES = 4096
 _EXPECTED = "a ROS 1 bag, an MCAP file, a ROS 2 bag folder, a .db3 file or the .yaml of a saved map"
 _OTHERS = (
-    ((b"\x28\xb5\x2f\xfd",), "it is compressed with zstd: give the folder of its bag, or decompress it with `zstd -d`"),
     ((b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"PK\x03\x04", b"\x04\x22\x4d\x18"), "it is an archive: unpack it first"),
     ((b"P5", b"P2", b"\x89PNG", b"BM"), "it is an image: give the .yaml that describes it as a map"),
 )

@@ -8,13 +8,13 @@ from collections.abc import Collection, Generator, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Protocol
 
 from replay.errors import InputError
 from replay.skip_cause import SkipCause
 from replay.sources.base import RawMessage, Source, SourceInfo
 from replay.sources.boundary import COMMON, Closing, translated
+from replay.sources.compressed_file import head_of, name_early_end, plain_copy, too_early
 from replay.sources.losses import Loss, Losses
 from replay.sources.mcap_file import McapFile
 from replay.sources.mcap_scan import Scan
@@ -22,14 +22,11 @@ from replay.sources.memory import MOST_BYTES
 from replay.sources.rosbag2_metadata import METADATA, listed_parts, name_gaps
 from replay.sources.sqlite3_file import Sqlite3File
 from replay.sources.topics import topic_table
-from replay.sources.zstd import MAGIC as ZSTD_MAGIC
-from replay.sources.zstd import ZstdError, decompress_file
+from replay.sources.zstd import ZstdError
 
 _MOST_OVERLAP_NS = 1_000_000_000
 
 _PART_SUFFIXES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
-_HEAD_BYTES = 16
-
 
 _FOREIGN = (*COMMON, ZstdError)
 
@@ -170,11 +167,10 @@ class _FilePart:
             raise ValueError(f"{self._path} is read after it was closed")
         with ExitStack() as stack:
             with translated(self._path, _FOREIGN):
-                plain, is_whole = self._plain(stack)
+                plain, is_whole = plain_copy(self._path, stack)
                 source = stack.enter_context(self._source(plain, is_whole=is_whole))
-                if not (is_whole or any(each.cause == SkipCause.ENDS_EARLY for each in source.losses.all)):
-                    detail = f"the file ends early at byte {self._path.stat().st_size}"
-                    source.losses.add(Loss(SkipCause.ENDS_EARLY, "its compression", detail))
+                if not is_whole:
+                    name_early_end(source)
             self._resources.add(stack)
             stack.callback(self._resources.discard, stack)
             try:
@@ -188,25 +184,14 @@ class _FilePart:
         for loss in source.losses.new():
             self._losses.add(replace(loss, place=f"{self.name}: {loss.place}"))
 
-    def _plain(self, stack: ExitStack) -> tuple[Path, bool]:
-        """Return the file, or a copy of what it decompresses to, there as long as the stack; whether it was whole."""
-        if not _head(self._path).startswith(ZSTD_MAGIC):
-            return self._path, True
-        folder = Path(stack.enter_context(TemporaryDirectory(prefix="replay-")))
-        plain = folder / self._path.name.removesuffix(".zstd")
-        return plain, decompress_file(self._path, plain)
-
     def _source(self, plain: Path, *, is_whole: bool) -> Source:
-        head = _head(plain)
+        head = head_of(plain)
         if McapFile.recognises(plain, head):
             return McapFile(plain, self._path, self._map_scan, self._most_bytes)
         if Sqlite3File.recognises(plain, head):
             return Sqlite3File(plain, self._path, self._most_bytes)
         if not is_whole:
-            raise InputError(
-                f"{self._path}: the file ends early at byte {self._path.stat().st_size}, too early to decompress any "
-                "of it; copy it again from where it was made"
-            )
+            raise too_early(self._path)
         raise InputError(
             f"{self._path}: this part of a ROS 2 bag is neither MCAP nor SQLite; copy it again from where it was made"
         )
@@ -264,8 +249,3 @@ def _parts_in(path: Path) -> list[Path]:
 
 def _natural(name: str) -> list[tuple[int, str]]:
     return [(int(digits or 0), text) for digits, text in re.findall(r"(\d*)(\D*)", name)]
-
-
-def _head(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(_HEAD_BYTES)

@@ -112,6 +112,12 @@ def _reading(write: Callable[..., Path], name: str, *arguments: Any, **options: 
     return prepare
 
 
+def _compressed(path: Path) -> Path:
+    bags.write_mcap(path)
+    path.write_bytes(zstd.zstd.compress(path.read_bytes()))
+    return path
+
+
 def _read(path: Path) -> tuple[int, tuple[Loss, ...]]:
     """Return how many maps there are, and what is lost."""
     with open_source(path) as source:
@@ -170,6 +176,9 @@ BOUNDARIES = {
     "folder, its metadata": Boundary("ruamel.yaml.YAML.load", _reading(*OPEN_FOLDER), ("yaml",), (), "all is read"),
     "folder, a part": Boundary(
         f"{ZSTD}.ZstdDecompressor", _reading(*OPEN_FOLDER, compression="file"), ("zstd",), SYSTEM, InputError
+    ),
+    "compressed alone": Boundary(
+        f"{ZSTD}.ZstdDecompressor", _reading(_compressed, "run.mcap"), ("zstd",), SYSTEM, InputError
     ),
     "saved map, its description": Boundary(
         "ruamel.yaml.YAML.load", _reading(bags.write_saved_map, "map.yaml", PIXELS), ("yaml",)
