@@ -113,7 +113,7 @@ class Rosbag1File(Closing):
         file = self._file
         if header is not None and 0 < file.index_pos <= file.size:
             try:
-                return read_index(self._plain, file, header, _foreign())
+                return read_index(self._plain, file, header)
             except UnusableIndexError as error:
                 return self._scanned(str(error), is_ended=error.is_cut)
         if header is None:

@@ -126,7 +126,13 @@ def test_a_bug_ends_with_a_status_and_a_word(replay: Program, two: Path, monkeyp
 
 @pytest.mark.parametrize("jobs", [1, 2])
 @pytest.mark.parametrize(
-    "where", ["replay.sinks.mcap_file.McapSink._tick", "replay.timeline.assemble", "replay.sinks.json_file.report_text"]
+    "where",
+    [
+        "replay.sources.mcap_file.message_data",
+        "replay.sinks.mcap_file.McapSink._tick",
+        "replay.timeline.assemble",
+        "replay.sinks.json_file.report_text",
+    ],
 )
 def test_a_bug_in_any_thread(
     replay: Program, two: Path, monkeypatch: pytest.MonkeyPatch, where: str, jobs: int
