@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 from mapmerge.config import MergeConfig
-from mapmerge.footprint import CANVAS_CELL_BYTES, may_need_bytes, needed_bytes
 from mapmerge.grid import Grid
 from replay.errors import BadMessage, InputError, UsageError
 from replay.skip_cause import SkipCause
@@ -61,6 +60,8 @@ class MemoryLimit:
         BadMessage
             With the cause ``over_memory``.
         """
+        from mapmerge.footprint import may_need_bytes, needed_bytes
+
         if may_need_bytes(grid, self.merge) <= self.max_bytes:
             return
         needed = needed_bytes(grid.cropped_to_known(), self.merge)
@@ -74,6 +75,8 @@ class MemoryLimit:
     @property
     def canvas_cells(self) -> int:
         """How many cells the merged map may have."""
+        from mapmerge.footprint import CANVAS_CELL_BYTES
+
         return max(1, self.max_bytes // CANVAS_CELL_BYTES)
 
 
