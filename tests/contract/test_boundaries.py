@@ -178,7 +178,11 @@ BOUNDARIES = {
         "a loss",
     ),
     "folder, its metadata": Boundary(
-        "ruamel.yaml.YAML.load", _reading(*OPEN_FOLDER), ("yaml",), (IndexError(), KeyError("x")), "all is read"
+        "ruamel.yaml.YAML.load",
+        _reading(*OPEN_FOLDER),
+        ("yaml",),
+        (IndexError(), KeyError("x")),
+        "all is read, with a loss",
     ),
     "folder, a part": Boundary(
         f"{ZSTD}.ZstdDecompressor", _reading(*OPEN_FOLDER, compression="file"), ("zstd",), SYSTEM, InputError

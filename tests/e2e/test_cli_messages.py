@@ -61,6 +61,17 @@ def test_where_damage_left_no_map_the_error_says_so(replay: Program, tmp_path: P
     assert "; lost are " in replay("info", run).out
 
 
+def test_metadata_that_cannot_be_read_is_named(replay: Program, tmp_path: Path) -> None:
+    run = write_rosbag2(tmp_path / "run", two_robots())
+    (run / "metadata.yaml").write_text("rosbag2_bagfile_information: [")
+    ran = replay.merge(run)
+    assert ran.statuses == {"r1": "reference", "r2": "merged"}
+    ((cause, place, lost),) = [(each["cause"], each["place"], each["messages"]) for each in ran.report["skipped_at"]]
+    assert (cause, place, lost) == ("damaged", "metadata.yaml", 0)
+    assert "(run, metadata.yaml): damaged: it cannot be read (ParserError" in ran.err
+    assert "(metadata.yaml): damaged: it cannot be read (ParserError" in replay("info", run).out
+
+
 class TestUpdates:
     PART = np.full((5, 3), 100, np.int8)
 
