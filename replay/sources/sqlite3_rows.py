@@ -12,7 +12,18 @@ from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import TooLargeError
-from replay.sources.sqlite3_salvage import BadPageError, Cell, Gap, Header, Leaves, Pages, Table, Value, record_of
+from replay.sources.sqlite3_salvage import (
+    BadPageError,
+    Cell,
+    Gap,
+    Header,
+    Leaves,
+    Pages,
+    Table,
+    Value,
+    layout_of,
+    record_of,
+)
 from replay.sources.topics import normalised_type
 from replay.words import counted
 
@@ -284,7 +295,7 @@ class SalvagedTables:
     def _add(self, found: _Found, cell: Cell) -> None:
         try:
             found.add(_row(self._tables["messages"], cell), cell)
-        except (BadPageError, KeyError):
+        except BadPageError:
             self._bad.add(cell.key)
 
     def _name_losses(self, cut: str, missing: str) -> None:
@@ -308,8 +319,12 @@ def _named(table: Table, key: int, record: list[Value]) -> Record:
 
 
 def _row(table: Table, cell: Cell) -> Row:
-    record = _named(table, cell.key, record_of(cell.head, cell.size))
-    time_ns, topic_id = record["timestamp"], record["topic_id"]
+    layout = layout_of(cell.head, cell.size)
+    try:
+        time_ns = layout.value(cell.head, table.columns.index("timestamp"))
+        topic_id = layout.value(cell.head, table.columns.index("topic_id"))
+    except ValueError as error:
+        raise BadPageError("its table has no such column") from error
     if not isinstance(time_ns, int) or not isinstance(topic_id, int):
         raise BadPageError("it is no message")
     return Row(time_ns, cell.key, topic_id)
@@ -318,7 +333,7 @@ def _row(table: Table, cell: Cell) -> Row:
 def _is_message(table: Table, cell: Cell, topic_ids: Collection[Value]) -> bool:
     try:
         return _row(table, cell).topic_id in topic_ids
-    except (BadPageError, KeyError):
+    except BadPageError:
         return False
 
 
