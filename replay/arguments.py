@@ -112,7 +112,8 @@ def _input_arguments(parser: argparse.ArgumentParser) -> None:
         "runs",
         nargs="+",
         metavar="RUN",
-        help="a recording, as PATH or ROBOT=PATH: .bag, ROS 2 bag folder, .db3, .mcap, or a saved map's .yaml",
+        help="a recording, as PATH or ROBOT=PATH: .bag, ROS 2 bag folder, .db3, .mcap, any of these "
+        "files compressed with zstd, or a saved map's .yaml",
     )
     group = parser.add_argument_group("which maps")
     group.add_argument(
@@ -226,7 +227,8 @@ def _output_arguments(parser: argparse.ArgumentParser) -> None:
         "--max-memory",
         metavar="SIZE",
         help="skip maps, and refuse placements, for which a robot's map or the merged map would need more memory than "
-        "this, such as 2GiB or 500MB (default: any map, and merged maps of up to 10⁹ cells)",
+        "this, such as 2GiB or 500MB, and what of a recording is larger to read at once (default: any map, merged maps "
+        "of up to 10⁹ cells, and chunks and messages of up to 1 GiB)",
     )
     rules.add_argument("--strict", action="store_true", help="end with an error at the first message that is unusable")
     rules.add_argument(

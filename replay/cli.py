@@ -38,6 +38,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("replay: interrupted; nothing was written", file=sys.stderr)
         return EXIT_INTERRUPTED
+    except MemoryError:
+        print(
+            "replay: error: there is not enough memory; close other programs, or leave out what needs too much with "
+            "--max-memory SIZE (of merge)",
+            file=sys.stderr,
+        )
+        return EXIT_BAD_INPUT
     except BrokenPipeError:
         # Whoever read our output has gone, and the files were written before any of it was printed; this keeps Python
         # from complaining at exit.

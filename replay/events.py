@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from mapmerge.merger import MergeResult
-from mapmerge.render import Picture
 from replay.skip_cause import SkipCause
+
+if TYPE_CHECKING:
+    from mapmerge.merger import MergeResult
+    from mapmerge.render import Picture
 
 Report = Mapping[str, Any]
 Clock = Literal["header", "log", "none"]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from decimal import Decimal
 
 from mapmerge.config import MergeConfig
-from mapmerge.footprint import CANVAS_CELL_BYTES, may_need_bytes, needed_bytes
 from mapmerge.grid import Grid
-from replay.errors import BadMessage, UsageError
+from replay.errors import BadMessage, InputError, UsageError
 from replay.skip_cause import SkipCause
 
 _UNITS = {"": 1, "B": 1, **{f"{k}B": 1000**n for n, k in enumerate("kMGT", 1)}}
@@ -59,6 +60,8 @@ class MemoryLimit:
         BadMessage
             With the cause ``over_memory``.
         """
+        from mapmerge.footprint import may_need_bytes, needed_bytes
+
         if may_need_bytes(grid, self.merge) <= self.max_bytes:
             return
         needed = needed_bytes(grid.cropped_to_known(), self.merge)
@@ -72,4 +75,35 @@ class MemoryLimit:
     @property
     def canvas_cells(self) -> int:
         """How many cells the merged map may have."""
+        from mapmerge.footprint import CANVAS_CELL_BYTES
+
         return max(1, self.max_bytes // CANVAS_CELL_BYTES)
+
+
+@contextmanager
+def enough_memory(grids: Mapping[str, Grid], stamp_ns: int) -> Iterator[None]:
+    """Say of which maps it was, if there is not enough memory to merge maps. Other errors of OpenCV are bugs and pass.
+
+    Raises
+    ------
+    InputError
+        Which names the robots whose maps these are, and what to do.
+    """
+    import cv2
+
+    try:
+        yield
+    except MemoryError as error:
+        raise InputError(_no_memory(grids, stamp_ns)) from error
+    except cv2.error as error:
+        if error.code != cv2.Error.StsNoMem:
+            raise
+        raise InputError(_no_memory(grids, stamp_ns)) from error
+
+
+def _no_memory(grids: Mapping[str, Grid], stamp_ns: int) -> str:
+    maps = ", ".join(f"{robot} ({grid.cols} × {grid.rows} cells)" for robot, grid in grids.items())
+    return (
+        f"the maps of {maps} at {stamp_ns} ns: there is not enough memory to merge them; leave out what needs too much "
+        "with --max-memory SIZE, or name fewer robots with --robots"
+    )

@@ -88,7 +88,7 @@ def summarise(options: RunOptions) -> RunSummary:
         If a recording cannot be read.
     """
     with ExitStack() as stack:
-        sources = [stack.enter_context(open_source(run.path)) for run in options.runs]
+        sources = [stack.enter_context(open_source(run.path, options.max_memory_bytes)) for run in options.runs]
         inputs = tuple(_input(source) for source in sources)
     try:
         with open_plan(options) as plan:

@@ -10,6 +10,7 @@ from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
 from replay.errors import InputError
 from replay.sinks.mcap_copy import McapCopy
+from replay.skip_cause import SkipCause
 from replay.sources.boundary import translated
 from replay.sources.mcap_chunk import BadPart, chunk_content, inner_records
 from replay.sources.mcap_records import (
@@ -116,13 +117,21 @@ class Walk:
                 if inner.opcode in {SCHEMA, CHANNEL, MESSAGE}:
                     yield self._item(chunk[inner.start : inner.end], inner.opcode)
         elif record.opcode == MESSAGE or record.opcode in _PARSERS:
+            if record.end - record.start > self._records.most_bytes:
+                raise self._too_large(f"the record at byte {record.start}")
             yield self._item(self._records.record_bytes(record.start), record.opcode)
 
     def _chunk(self, start: int) -> bytes:
         try:
             return chunk_content(self._records, start)[0]
         except BadPart as error:
+            if error.cause == SkipCause.OVER_MEMORY:
+                raise self._too_large(f"the chunk at byte {start}") from error
             raise InputError(f"{self._records.path}: the chunk at byte {start} is damaged: {error.detail}") from error
+
+    def _too_large(self, part: str) -> InputError:
+        path, most_bytes = self._records.path, self._records.most_bytes
+        return InputError(f"{path}: {part} has more than {most_bytes} bytes, the most that is read at once")
 
     def _item(self, record: bytes, opcode: int) -> _Item:
         if opcode == MESSAGE:

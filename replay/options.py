@@ -97,9 +97,9 @@ class RunOptions:
     merge
         Settings of the merger.
     max_memory_bytes
-        The most memory that one robot's map, or the merged map, may need; None for what `MergeConfig` allows. A map
-        that needs more is not used. It affects results, but is no setting of a machine: the same limit gives the same
-        outcome everywhere.
+        The most memory that one robot's map, the merged map, or a message or chunk that is read may need; None for
+        what `MergeConfig` and `replay.sources.memory` allow. What needs more is not used. It affects results, but is no
+        setting of a machine: the same limit gives the same outcome everywhere.
     jobs
         How many threads work at once: more than one read ahead, match pairs and write beside the merging. The outcome
         is the same.

@@ -18,6 +18,7 @@ from replay.background import Courier, ReadAhead
 from replay.beliefs import Beliefs
 from replay.errors import InputError
 from replay.events import Event, Finished, Merged, Noted, Skipped, Started, Timing
+from replay.footprint import enough_memory
 from replay.gallery import Gallery
 from replay.options import RunOptions
 from replay.plan import Plan, memory_limit, open_plan
@@ -61,12 +62,13 @@ def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
                 priors, notes = beliefs.now()
                 yield from _noted(report, notes)
             begin = perf_counter()
-            try:
-                result = merger.step(tick.grids, priors, is_last=tick.is_last)
-            except MapMergeError as error:
-                raise InputError(f"the maps of {', '.join(tick.grids)} at {tick.stamp_ns} ns: {error}") from error
-            merged = perf_counter()
-            pictures = gallery.due(result)
+            with enough_memory(tick.grids, tick.stamp_ns):
+                try:
+                    result = merger.step(tick.grids, priors, is_last=tick.is_last)
+                except MapMergeError as error:
+                    raise InputError(f"the maps of {', '.join(tick.grids)} at {tick.stamp_ns} ns: {error}") from error
+                merged = perf_counter()
+                pictures = gallery.due(result)
             timing = Timing(merged - begin, perf_counter() - merged)
             report.take(tick.stamp_ns, result, priors)
             done, stamp_ns = done + tick.messages, tick.stamp_ns

@@ -125,13 +125,14 @@ def open_plan(options: RunOptions) -> Iterator[Plan]:
     with ExitStack() as stack:
         if not options.runs:
             raise UsageError("no recording was given; expected one or more of PATH or ROBOT=PATH")
-        sources = [stack.enter_context(open_source(run.path)) for run in options.runs]
+        sources = [stack.enter_context(open_source(run.path, options.max_memory_bytes)) for run in options.runs]
         yield _plan(sources, options)
 
 
 def _plan(sources: list[Source], options: RunOptions) -> Plan:
     infos = tuple(source.info for source in sources)
-    selected = select(options.runs, infos, robots=options.robots, topics=options.topics)
+    losses = [source.losses.all for source in sources]
+    selected = select(options.runs, infos, robots=options.robots, topics=options.topics, losses=losses)
     refuse_unfit([item.robot for item in selected], options.init_poses)
     probes = agreed(_probes(sources, infos, selected, options))
     refuse_recorded_twice(probes, [run.path.name for run in options.runs], options.reorder_window_ns)

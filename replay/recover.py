@@ -18,8 +18,8 @@ from replay.sinks.mcap_copy import McapCopy
 from replay.sinks.partial_file import PartialFile
 from replay.sinks.publication import publish
 from replay.sources.boundary import translated
-from replay.sources.mcap_chunk import MOST_BYTES
 from replay.sources.mcap_records import MAGIC, RecordFile, written_bytes
+from replay.sources.memory import MOST_BYTES
 from replay.words import counted, moment, recovered
 
 _LEFT_OUT_NAMED = 5

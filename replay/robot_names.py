@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from replay.runs import RunPath, TopicChoice
 
 _NOT_A_MAP = re.compile(r"(^|[/_])(costmap|mask|keepout|speed)([/_]|$)", re.IGNORECASE)
-_SUFFIXES = (".zstd", ".bag", ".db3", ".mcap", ".yaml", ".yml")
+_SUFFIXES = (".zstd", ".zst", ".bag", ".db3", ".mcap", ".yaml", ".yml")
 
 
 def is_costmap_or_mask(topic: str) -> bool:

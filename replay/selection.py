@@ -11,6 +11,7 @@ from replay.plain_text import brief, listed
 from replay.robot_names import file_names, is_costmap_or_mask, names_in, namespace
 from replay.runs import RunPath, TopicChoice
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, SourceInfo
+from replay.sources.losses import Loss, summed_up
 
 MOST_UNNAMED = 100
 """Every pair of robots is matched: of more robots than this, somebody must have meant it."""
@@ -36,6 +37,7 @@ def select(
     *,
     robots: Sequence[str] | None = None,
     topics: Sequence[TopicChoice] = (),
+    losses: Sequence[Iterable[Loss]] = (),
 ) -> tuple[Selected, ...]:
     """Find each robot's map topic; the first robot is the reference.
 
@@ -47,6 +49,8 @@ def select(
         Names asked for, the reference first; None for all that are found.
     topics
         Topics said outright.
+    losses
+        What is lost of each input, which may be why there is no map.
 
     Raises
     ------
@@ -59,7 +63,7 @@ def select(
     for info in infos:
         counts.update({topic.name: topic.message_count for topic in info.topics if topic.msgtype == GRID_TYPE})
     if not counts.total():
-        raise InputError(_nothing(runs, infos))
+        raise InputError(_nothing(runs, infos, losses))
     found = _discovered(runs, infos, topics, counts)
     there = _flags(found or _discovered(runs, infos, (), counts))
     wanted = list(robots) if robots is not None else _all_names(runs, found)
@@ -215,11 +219,13 @@ def _flags(topics: Mapping[str, Iterable[str]]) -> str:
     return listed(flags, "  ")
 
 
-def _nothing(runs: Sequence[RunPath], infos: Sequence[SourceInfo]) -> str:
+def _nothing(runs: Sequence[RunPath], infos: Sequence[SourceInfo], losses: Sequence[Iterable[Loss]]) -> str:
     paths = ", ".join(str(run.path) for run in runs)
     types = sorted({topic.msgtype for info in infos for topic in info.topics if topic.message_count > 0})
     if UPDATE_TYPE in types:
         what = "only updates of parts of maps, no full map"
     else:
         what = f"no map, only {listed([brief(each) for each in types])}" if types else "no messages"
-    return f"{paths}: {what}; expected a topic of type {GRID_TYPE}, such as /r1/map"
+    lost = summed_up((run.path.name, loss) for run, own in zip(runs, losses, strict=False) for loss in own)
+    expected = f"expected a topic of type {GRID_TYPE}, such as /r1/map"
+    return f"{paths}: {what}; {expected}{f'; {lost}' if lost else ''}"

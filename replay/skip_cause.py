@@ -27,7 +27,7 @@ class SkipCause(StrEnum):
     BAD_TRANSFORM = "bad_transform"
     """A transform in it has no finite shift, no rotation, or not two frames; the others in it are used."""
     OVER_MEMORY = "over_memory"
-    """It would need more memory than --max-memory allows."""
+    """It would need more memory than --max-memory allows, or is a part of a file that would."""
     ENDS_EARLY = "ends_early"
     """The file ends before the recording does."""
     DAMAGED = "damaged"

@@ -31,7 +31,7 @@ def deserialized(raw: RawMessage, msgtype: str) -> object:
         if raw.encoding == "ros1":
             return ros1_typestore().deserialize_ros1(data, msgtype)
         return ros2_typestore().deserialize_cdr(data, msgtype)
-    except (SerdeError, struct.error, ValueError, LookupError, AssertionError, TypeError, OverflowError) as error:
+    except (SerdeError, struct.error, ValueError, LookupError, AssertionError, OverflowError) as error:
         found = " ".join(str(error).split()) or type(error).__name__
         raise BadMessage(
             "undecodable", f"{len(raw.data)} bytes are no {raw.encoding} {raw.msgtype}: {found}"

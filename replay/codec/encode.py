@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mapmerge.grid import Grid
-from mapmerge.render import Rgb
 from mapmerge.sim2 import Sim2
 from replay.codec.typestores import ros2_typestore
 from replay.errors import OutputError
 from replay.sources.base import GRID_TYPE, TF_TYPE
+
+if TYPE_CHECKING:
+    from mapmerge.render import Rgb
 
 IMAGE_TYPE = "sensor_msgs/msg/Image"
 

@@ -12,6 +12,7 @@ from typing import Protocol, cast
 from replay.errors import InputError
 from replay.sources.base import Source
 from replay.sources.boundary import translated
+from replay.sources.memory import MOST_BYTES
 
 # Tried in this order. The modules are imported for their `recognises` and import what they read with only when they
 # are used.
@@ -20,13 +21,13 @@ SOURCES: dict[str, str] = {
     "mcap": "replay.sources.mcap_file:McapFile",
     "rosbag2": "replay.sources.rosbag2_folder:Rosbag2Folder",
     "sqlite3": "replay.sources.sqlite3_file:Sqlite3File",
+    "zstd": "replay.sources.compressed_file:CompressedFile",
     "map_server": "replay.sources.map_server:SavedMap",
 }
 
 _HEAD_BYTES = 4096
 _EXPECTED = "a ROS 1 bag, an MCAP file, a ROS 2 bag folder, a .db3 file or the .yaml of a saved map"
 _OTHERS = (
-    ((b"\x28\xb5\x2f\xfd",), "it is compressed with zstd: give the folder of its bag, or decompress it with `zstd -d`"),
     ((b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"PK\x03\x04", b"\x04\x22\x4d\x18"), "it is an archive: unpack it first"),
     ((b"P5", b"P2", b"\x89PNG", b"BM"), "it is an image: give the .yaml that describes it as a map"),
 )
@@ -35,8 +36,8 @@ _OTHERS = (
 class SourceClass(Protocol):
     """What a row of `SOURCES` names."""
 
-    def __call__(self, path: Path) -> Source:
-        """Open a recording."""
+    def __call__(self, path: Path, *, most_bytes: int) -> Source:
+        """Open a recording, of which no chunk and no message is read that has more than ``most_bytes``."""
 
     def recognises(self, path: Path, head: bytes) -> bool:
         """Tell whether this class is the one to open, or to refuse, what is at ``path``.
@@ -45,8 +46,13 @@ class SourceClass(Protocol):
         """
 
 
-def open_source(path: Path) -> Source:
+def open_source(path: Path, most_bytes: int | None = None) -> Source:
     """Open the recording at ``path``, whatever its name.
+
+    Parameters
+    ----------
+    most_bytes
+        The largest message, or decompressed chunk, that is read; None for `replay.sources.memory.MOST_BYTES`.
 
     Raises
     ------
@@ -58,7 +64,7 @@ def open_source(path: Path) -> Source:
         for name in SOURCES:
             source = _source_class(name)
             if source.recognises(path, head):
-                return source(path)
+                return source(path, most_bytes=MOST_BYTES if most_bytes is None else most_bytes)
         raise InputError(_unknown(path, head))
 
 

@@ -12,21 +12,14 @@ from typing import Self
 
 from replay.errors import InputError
 
-# What any of the libraries may raise when the bytes are not what it expects; each source adds the classes of its own.
-# RuntimeError is lz4's, AssertionError rosbags', struct.error and EOFError everyone's.
-COMMON: tuple[type[Exception], ...] = (
-    OSError,
-    EOFError,
-    ValueError,
-    LookupError,
-    TypeError,
-    AttributeError,
-    AssertionError,
-    ArithmeticError,
-    RuntimeError,
-    MemoryError,
-    struct.error,
-)
+# What is raised below where bytes are not what is expected, or the machine has not what is needed; each source adds
+# the classes of its own. OverflowError is that of numbers that no file is as long as. What would sooner be a bug of
+# ours than damage is left out: a bug must show itself.
+COMMON: tuple[type[Exception], ...] = (OSError, EOFError, ValueError, OverflowError, MemoryError, struct.error)
+
+# What libraries written in Python raise as well where they take bad bytes for good ones. Of our own code these would be
+# bugs, so that they are translated around a call of such a library, and nowhere else.
+OF_LIBRARIES: tuple[type[Exception], ...] = (LookupError, AssertionError)
 
 TEXT_MODE = (
     "as after a transfer in text mode, which converts line endings: copy it again in binary mode"
@@ -65,13 +58,13 @@ def translated(path: Path, foreign: tuple[type[Exception], ...] = COMMON, *, par
 def _line(path: Path, error: Exception, part: str) -> str:
     if isinstance(error, PermissionError):
         return f"{error.filename or path}: permission denied; make it readable for you and try again"
+    if isinstance(error, MemoryError):
+        what = f"{part} takes" if part else "it takes"
+        return f"{path}: {what} more memory than there is; close other programs, or give a smaller --max-memory"
     if isinstance(error, OSError) and error.errno in _LIMITS:
         return f"{path}: it cannot be read: {error.strerror}; {_LIMITS[error.errno]} and try again"
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename or path}: {error.strerror}; expected a recording that can be read"
-    if isinstance(error, MemoryError):
-        what = f"{part} takes" if part else "it takes"
-        return f"{path}: {what} more memory than there is; close other programs, or raise the limit (`ulimit -v`)"
     name, text = type(error).__name__, " ".join(str(error).split())
     found = f"{name}: {text}" if text else name
     what = f"{part} cannot be read" if part else "it cannot be read"

@@ -14,7 +14,6 @@ import functools
 import re
 from typing import TYPE_CHECKING, Literal
 
-from replay.codec.typestores import ros1_typestore, ros2_typestore
 from replay.sources.base import TF_TYPE, TF_TYPES
 
 if TYPE_CHECKING:
@@ -53,6 +52,8 @@ def differing_field(msgtype: str, definition: str, ros: Literal[1, 2]) -> str | 
         The first difference, as in "width of nav_msgs/msg/MapMetaData is uint64 in the recording, uint32 in the
         standard"; None if there is none, or if no standard definition of this type is built in.
     """
+    from replay.codec.typestores import ros1_typestore, ros2_typestore
+
     store = ros1_typestore() if ros == 1 else ros2_typestore()
     standard = {name: fields for name, (_, fields) in store.fielddefs.items()}
     known = TF_TYPE if msgtype in TF_TYPES else msgtype

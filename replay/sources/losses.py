@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from replay.skip_cause import SkipCause
+from replay.words import counted
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,3 +60,27 @@ class Losses:
     def all(self) -> tuple[Loss, ...]:
         """All that were met so far."""
         return tuple(self._known)
+
+
+def summed_up(losses: Iterable[tuple[str, Loss]]) -> str:
+    """Return in words how many messages are lost, by cause, and where the first are; "" if none are.
+
+    Parameters
+    ----------
+    losses
+        Each with the name of its recording.
+    """
+    costly = [(name, loss) for name, loss in losses if loss.messages != 0]
+    if not costly:
+        return ""
+    numbers: dict[SkipCause, list[int | None]] = {}
+    for _, loss in costly:
+        numbers.setdefault(loss.cause, []).append(loss.messages)
+    causes = ", ".join(f"{_number(each)} ({cause})" for cause, each in numbers.items())
+    name, first = costly[0]
+    return f"lost are {causes}, first {name}, {first.place}: {first.detail}"
+
+
+def _number(messages: Sequence[int | None]) -> str:
+    known = sum(1 if each is None else each for each in messages)
+    return f"{'at least ' if None in messages else ''}{counted(known, 'message')}"

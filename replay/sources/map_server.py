@@ -26,6 +26,7 @@ from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.image_file import read_pixels
 from replay.sources.losses import Losses
 from replay.sources.map_image import Mode, Thresholds, cells_from_pixels
+from replay.sources.memory import MOST_BYTES
 from replay.sources.yaml_text import load_yaml
 
 TOPIC = "/map"
@@ -61,7 +62,8 @@ def _foreign() -> tuple[type[Exception], ...]:
 class SavedMap(Closing):
     """A saved map. Its image is read when its message is asked for."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, most_bytes: int = MOST_BYTES) -> None:
+        del most_bytes  # its image has limits of its own, and its map is left out where it needs too much
         self.path = path
         self.losses = Losses()
         with translated(path, _foreign()):

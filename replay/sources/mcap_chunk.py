@@ -16,9 +16,7 @@ from typing import NamedTuple
 
 from replay.skip_cause import SkipCause
 from replay.sources.mcap_records import CHUNK, MESSAGE, MESSAGE_HEAD, RECORD, Record, RecordFile
-
-MOST_BYTES = 1 << 30
-"""The largest chunk that is read, as decompressed, unless something else is said."""
+from replay.sources.memory import over_memory
 
 _HEAD = struct.Struct("<QQQII")
 _LENGTH = struct.Struct("<Q")
@@ -161,7 +159,7 @@ def _records(content: bytes) -> Iterator[Record]:
 
 
 def _too_large(file: RecordFile) -> BadPart:
-    return BadPart(SkipCause.OVER_MEMORY, f"it has more than {file.most_bytes} bytes")
+    return BadPart(SkipCause.OVER_MEMORY, over_memory(file.most_bytes))
 
 
 def _decompressed(compression: bytes, data: bytes, most_bytes: int) -> Iterator[bytes]:

@@ -13,7 +13,7 @@ from replay.sources.base import RawMessage, SourceInfo
 from replay.sources.boundary import TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
 from replay.sources.losses import Loss, Losses
-from replay.sources.mcap_chunk import MOST_BYTES, BadPart, chunk_content, cut_chunk_content
+from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content
 from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, indexed_entries, read_summary
 from replay.sources.mcap_records import (
     CHUNK,
@@ -26,6 +26,7 @@ from replay.sources.mcap_records import (
     written_bytes,
 )
 from replay.sources.mcap_scan import Scan, chunk_loss, indexed_counts, scan, unknown_types
+from replay.sources.memory import MOST_BYTES, TooLargeError
 from replay.sources.topics import ENCODINGS, topic_table
 from replay.sources.zstd import ZstdError, decompressed_cdr
 
@@ -196,7 +197,7 @@ class McapFile(Closing):
             if encoding == "cdr":
                 try:
                     data = decompressed_cdr(data, self._file.most_bytes)
-                except ZstdError as error:
+                except (ZstdError, TooLargeError) as error:
                     self.losses.add(_bad_message(entry, channel, error))
                     continue
             yield entry, RawMessage(channel.topic, channel.msgtype, encoding, entry.log_time_ns, data)
@@ -273,5 +274,7 @@ def _are_maps(channels: Mapping[int, Channel]) -> bool:
 def _bad_message(entry: Entry, channel: Channel, error: Exception) -> Loss:
     inside = "" if entry.inner == NO_CHUNK else f"at byte {entry.inner} of the chunk "
     place = f"the message {inside}at byte {entry.block}"
+    if isinstance(error, TooLargeError):
+        return Loss(SkipCause.OVER_MEMORY, place, str(error), 1, channel.topic)
     found = " ".join(str(error).split())
     return Loss(SkipCause.DAMAGED, place, f"it cannot be decompressed ({found})", 1, channel.topic)

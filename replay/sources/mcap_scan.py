@@ -34,6 +34,7 @@ from replay.sources.mcap_records import (
     message_header,
 )
 from replay.sources.mcap_walk import Gap, Walk
+from replay.sources.memory import over_memory
 from replay.words import counted
 
 _CRC = struct.Struct("<I")
@@ -131,7 +132,7 @@ class _Found:
         """Take in a message outside of chunks."""
         length = record.end - record.start
         if length > self._file.most_bytes:
-            detail = f"it has {length} bytes; at most {self._file.most_bytes} are read"
+            detail = over_memory(self._file.most_bytes)
             self._losses.append(Loss(SkipCause.OVER_MEMORY, f"the message at byte {record.start}", detail, 1))
             return
         self._add(message, record.start, NO_CHUNK, self._others)

@@ -14,7 +14,8 @@ from replay.sources.boundary import COMMON, TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
 from replay.sources.definitions import differing_field
 from replay.sources.losses import Loss, Losses
-from replay.sources.rosbag1_chunks import MOST_BYTES, Chunk, read_chunk, records_in
+from replay.sources.memory import MOST_BYTES
+from replay.sources.rosbag1_chunks import Chunk, read_chunk, records_in
 from replay.sources.rosbag1_index import Index, UnusableIndexError, read_index
 from replay.sources.rosbag1_records import BAG_HEADER, CONNECTION, MESSAGE, Record, record_in, record_of
 from replay.sources.rosbag1_scan import BagFile, Contents, Entry, Scan
@@ -43,17 +44,20 @@ class Rosbag1File(Closing):
 
     Parameters
     ----------
+    copy_of
+        The file of which ``path`` is a decompressed copy, to be named in errors.
     most_bytes
         How many bytes a chunk may have, decompressed; larger ones are left out.
     """
 
-    def __init__(self, path: Path, most_bytes: int = MOST_BYTES) -> None:
-        self.path = path
+    def __init__(self, path: Path, copy_of: Path | None = None, most_bytes: int = MOST_BYTES) -> None:
+        self.path = copy_of or path
         self.losses = Losses()
+        self._plain = path
         self._most_bytes = most_bytes
-        with ExitStack() as stack, translated(path, _foreign()):
+        with ExitStack() as stack, translated(self.path, _foreign()):
             file = stack.enter_context(path.open("rb"))
-            self._file, header = _begin(path, BagFile(file, path.stat().st_size, len(_MAGIC_2_0), 0))
+            self._file, header = _begin(self.path, BagFile(file, path.stat().st_size, len(_MAGIC_2_0), 0))
             self._contents = self._read_contents(header)
             self._differing = self._differing_topics()
             self._resources = stack.pop_all()
@@ -109,7 +113,7 @@ class Rosbag1File(Closing):
         file = self._file
         if header is not None and 0 < file.index_pos <= file.size:
             try:
-                return read_index(self.path, file, header, _foreign())
+                return read_index(self._plain, file, header)
             except UnusableIndexError as error:
                 return self._scanned(str(error), is_ended=error.is_cut)
         if header is None:

@@ -9,10 +9,8 @@ from io import BytesIO
 from typing import BinaryIO, Protocol
 
 from replay.skip_cause import SkipCause
+from replay.sources.memory import MOST_BYTES, over_memory
 from replay.sources.rosbag1_records import CONNECTION, MESSAGE, Record, find_in, is_unfinished, record_in
-
-MOST_BYTES = 1 << 30
-"""How many bytes a chunk may have, decompressed."""
 
 # So little is given to a decompressor at once that it returns at most some 20 MB.
 _BZ2_BYTES = 1 << 12
@@ -166,7 +164,7 @@ def _damaged(detail: str) -> Chunk:
 
 
 def _over_memory(most_bytes: int) -> Chunk:
-    return Chunk(b"", Problem(SkipCause.OVER_MEMORY, f"it has more than {most_bytes} bytes"))
+    return Chunk(b"", Problem(SkipCause.OVER_MEMORY, over_memory(most_bytes)))
 
 
 def records_in(chunk: bytes, place: ChunkPlace) -> Iterator[Record | None]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import errno
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
+from replay.sources.boundary import COMMON, OF_LIBRARIES
 from replay.sources.rosbag1_chunks import ChunkPlace
 from replay.sources.rosbag1_records import CHUNK, CHUNK_INFO, CONNECTION, Record, index_rows, record_of
 from replay.sources.rosbag1_scan import BagFile, Entry, Topic, index_section
@@ -65,7 +67,7 @@ class Index:
             yield from (Entry(time_ns, chunk, inner, connection) for time_ns, inner in index_rows(rows))
 
 
-def read_index(path: Path, file: BagFile, header: Record, foreign: tuple[type[Exception], ...]) -> Index:
+def read_index(path: Path, file: BagFile, header: Record) -> Index:
     """Return what the index says, read by rosbags.
 
     Raises
@@ -73,13 +75,14 @@ def read_index(path: Path, file: BagFile, header: Record, foreign: tuple[type[Ex
     UnusableIndexError
         If it cannot be read, or contradicts itself.
     """
-    from replay.sources.rosbag1_lean import LeanReader
+    from rosbags.rosbag1 import ReaderError
 
     records = list(index_section(file.file, file.index_pos))
     _check_counts(file, header, records)
     connections_in = [each.number(b"count") for each in records if each.op == CHUNK_INFO]
+    foreign: tuple[type[Exception], ...] = (*COMMON, ReaderError)
     try:
-        with LeanReader(path) as reader:
+        with _opened(path) as reader:
             _check_chunk_counts(reader, connections_in)
             return Index(reader, {start: _place(file, start) for start in reader.chunks}, file.file)
     except foreign as error:
@@ -88,6 +91,21 @@ def read_index(path: Path, file: BagFile, header: Record, foreign: tuple[type[Ex
             raise
         found = " ".join(str(error).split()) or "an index record has not the size that its count calls for"
         raise UnusableIndexError(f"the index of this bag is damaged ({found})") from error
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[LeanReader]:
+    from rosbags.rosbag1 import ReaderError
+
+    from replay.sources.rosbag1_lean import LeanReader
+
+    reader = LeanReader(path)
+    try:
+        reader.open()
+    except OF_LIBRARIES as error:
+        raise ReaderError(" ".join(str(error).split())) from error
+    with closing(reader):
+        yield reader
 
 
 def _check_counts(file: BagFile, header: Record, records: Sequence[Record]) -> None:

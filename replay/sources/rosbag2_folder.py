@@ -8,30 +8,27 @@ from collections.abc import Collection, Generator, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Protocol
 
 from replay.errors import InputError
 from replay.skip_cause import SkipCause
 from replay.sources.base import RawMessage, Source, SourceInfo
 from replay.sources.boundary import COMMON, Closing, translated
+from replay.sources.compressed_file import head_of, name_early_end, plain_copy, too_early
 from replay.sources.losses import Loss, Losses
 from replay.sources.mcap_file import McapFile
 from replay.sources.mcap_scan import Scan
+from replay.sources.memory import MOST_BYTES
 from replay.sources.rosbag2_metadata import METADATA, listed_parts, name_gaps
 from replay.sources.sqlite3_file import Sqlite3File
 from replay.sources.topics import topic_table
-from replay.sources.zstd import MAGIC as ZSTD_MAGIC
-from replay.sources.zstd import ZstdError, decompress_file
+from replay.sources.zstd import ZstdError
 
 _MOST_OVERLAP_NS = 1_000_000_000
 
 _PART_SUFFIXES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
-_HEAD_BYTES = 16
-
 
 _FOREIGN = (*COMMON, ZstdError)
-_BEGINNINGS = (b"SQLite", b"\x89MCAP")
 
 
 class Rosbag2Folder(Closing):
@@ -44,9 +41,14 @@ class Rosbag2Folder(Closing):
     A part is open, and decompressed into a temporary directory if it was compressed as a file, only while its contents
     are listed and while its messages are due: a bag may have more parts than files may be open, and be larger
     decompressed than the disk. What is compressed is told by the files themselves, not by the metadata.
+
+    Parameters
+    ----------
+    most_bytes
+        The largest message, or decompressed chunk, that is read.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, most_bytes: int = MOST_BYTES) -> None:
         self.path = path
         self.losses = Losses()
         with translated(path, _FOREIGN):
@@ -57,7 +59,7 @@ class Rosbag2Folder(Closing):
                     f"{path}: this bag has no file with messages, and its {METADATA} lists none; copy its .db3 or "
                     ".mcap files here"
                 )
-            self._parts = _opened_parts(parts, self.losses)
+            self._parts = _opened_parts(parts, self.losses, most_bytes)
             if not listed:
                 name_gaps(parts, self.losses)
                 _check_that_they_belong_together(path, self._parts)
@@ -126,8 +128,9 @@ def merged_by_time(parts: Sequence[Part], topics: Collection[str]) -> Iterator[R
 class _FilePart:
     """One file of a bag, open only while it is read."""
 
-    def __init__(self, path: Path, losses: Losses) -> None:
+    def __init__(self, path: Path, losses: Losses, most_bytes: int) -> None:
         self._path = path
+        self._most_bytes = most_bytes
         self._losses = losses
         self._map_scan: Scan | None = None
         self._resources: set[ExitStack] = set()
@@ -164,11 +167,10 @@ class _FilePart:
             raise ValueError(f"{self._path} is read after it was closed")
         with ExitStack() as stack:
             with translated(self._path, _FOREIGN):
-                plain, is_whole = self._plain(stack)
+                plain, is_whole = plain_copy(self._path, stack)
                 source = stack.enter_context(self._source(plain, is_whole=is_whole))
-                if not (is_whole or any(each.cause == SkipCause.ENDS_EARLY for each in source.losses.all)):
-                    detail = f"the file ends early at byte {self._path.stat().st_size}"
-                    source.losses.add(Loss(SkipCause.ENDS_EARLY, "its compression", detail))
+                if not is_whole:
+                    name_early_end(source)
             self._resources.add(stack)
             stack.callback(self._resources.discard, stack)
             try:
@@ -182,31 +184,20 @@ class _FilePart:
         for loss in source.losses.new():
             self._losses.add(replace(loss, place=f"{self.name}: {loss.place}"))
 
-    def _plain(self, stack: ExitStack) -> tuple[Path, bool]:
-        """Return the file, or a copy of what it decompresses to, there as long as the stack; whether it was whole."""
-        if not _head(self._path).startswith(ZSTD_MAGIC):
-            return self._path, True
-        folder = Path(stack.enter_context(TemporaryDirectory(prefix="replay-")))
-        plain = folder / self._path.name.removesuffix(".zstd")
-        return plain, decompress_file(self._path, plain, _BEGINNINGS)
-
     def _source(self, plain: Path, *, is_whole: bool) -> Source:
-        head = _head(plain)
+        head = head_of(plain)
         if McapFile.recognises(plain, head):
-            return McapFile(plain, self._path, self._map_scan)
+            return McapFile(plain, self._path, self._map_scan, self._most_bytes)
         if Sqlite3File.recognises(plain, head):
-            return Sqlite3File(plain, self._path)
+            return Sqlite3File(plain, self._path, self._most_bytes)
         if not is_whole:
-            raise InputError(
-                f"{self._path}: the file ends early at byte {self._path.stat().st_size}, too early to decompress any "
-                "of it; copy it again from where it was made"
-            )
+            raise too_early(self._path)
         raise InputError(
             f"{self._path}: this part of a ROS 2 bag is neither MCAP nor SQLite; copy it again from where it was made"
         )
 
 
-def _opened_parts(paths: Sequence[Path], losses: Losses) -> list[_FilePart]:
+def _opened_parts(paths: Sequence[Path], losses: Losses, most_bytes: int) -> list[_FilePart]:
     """Return the parts that can be read, and name the others.
 
     Raises
@@ -217,7 +208,7 @@ def _opened_parts(paths: Sequence[Path], losses: Losses) -> list[_FilePart]:
     parts, errors = [], []
     for path in paths:
         try:
-            parts.append(_FilePart(path, losses))
+            parts.append(_FilePart(path, losses, most_bytes))
         except InputError as error:
             if isinstance(error.__cause__, OSError):
                 # of the machine, not of the recording
@@ -258,8 +249,3 @@ def _parts_in(path: Path) -> list[Path]:
 
 def _natural(name: str) -> list[tuple[int, str]]:
     return [(int(digits or 0), text) for digits, text in re.findall(r"(\d*)(\D*)", name)]
-
-
-def _head(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(_HEAD_BYTES)

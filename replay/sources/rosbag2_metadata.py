@@ -14,12 +14,14 @@ from replay.sources.yaml_text import load_yaml
 
 METADATA = "metadata.yaml"
 
+_KEY = "rosbag2_bagfile_information"
+
 # as recorders number parts: without leading zeros
 _NUMBERED = re.compile(r"(.*)_(0|[1-9]\d{0,4})((?:\.[a-z0-9]+)+)")
 
 
 def listed_parts(path: Path, losses: Losses) -> list[Path]:
-    """Return the files that the metadata of a bag lists, and name those that are missing.
+    """Return the files that the metadata of a bag lists, and name those that are missing, or metadata that lists none.
 
     Returns
     -------
@@ -32,7 +34,7 @@ def listed_parts(path: Path, losses: Losses) -> list[Path]:
     InputError
         If all files that it lists are missing, or their compression is not read.
     """
-    metadata = _metadata(path / METADATA)
+    metadata, problem = _metadata(path / METADATA)
     mode = str(metadata.get("compression_mode") or "none").lower()
     kind = metadata.get("compression_format")
     if mode != "none" and kind != "zstd":
@@ -40,6 +42,9 @@ def listed_parts(path: Path, losses: Losses) -> list[Path]:
             f"{path}: the bag is compressed with '{kind}'; zstd is read: convert it with `ros2 bag convert`"
         )
     listed = metadata.get("relative_file_paths")
+    if problem or (metadata and not (listed and isinstance(listed, list))):
+        detail = f"{problem or 'it lists no files'}; all bag files of the folder are taken for parts of the recording"
+        losses.add(Loss(SkipCause.DAMAGED, METADATA, detail, 0))
     # Before Foxy the names had the folder in front.
     names = dict.fromkeys(PureWindowsPath(str(each)).name for each in listed) if isinstance(listed, list) else {}
     found = {name: _present(path, name) for name in names}
@@ -92,16 +97,18 @@ def _message_counts(metadata: Mapping[str, Any]) -> dict[str, int]:
     return counts
 
 
-def _metadata(path: Path) -> dict[str, Any]:
-    """Return what the metadata says; nothing if it is not there, damaged, or that of something else."""
+def _metadata(path: Path) -> tuple[dict[str, Any], str]:
+    """Return what the metadata says; nothing, and why, if it is damaged or that of something else."""
     if not path.exists():
-        return {}
+        return {}, ""
     try:
         document = load_yaml(path)
     except InputError as error:
         # what cannot be opened at all, others may be able to open
         if isinstance(error.__cause__, OSError):
             raise
-        return {}
-    metadata = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
-    return metadata if isinstance(metadata, dict) else {}
+        return {}, str(error).removeprefix(f"{path}: ")
+    metadata = document.get(_KEY) if isinstance(document, dict) else None
+    if not isinstance(metadata, dict) or not metadata:
+        return {}, f"it has no '{_KEY}' with values below it, as that of a bag has"
+    return metadata, ""

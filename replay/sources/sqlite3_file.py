@@ -20,6 +20,7 @@ from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE, RawMessage, So
 from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.definitions import differing_field
 from replay.sources.losses import Loss, Losses
+from replay.sources.memory import MOST_BYTES, TooLargeError
 from replay.sources.sqlite3_beside import JOURNAL, WAL, beside, check_applied, check_journal, check_wal, copied
 from replay.sources.sqlite3_rows import BadRowError, BagTables, NoBagError, Record, Row, SalvagedTables, SqliteTables
 from replay.sources.sqlite3_salvage import read_header
@@ -52,10 +53,13 @@ class Sqlite3File(Closing):
     ----------
     copy_of
         The file of which ``path`` is a decompressed copy, to be named in errors.
+    most_bytes
+        The largest message that is read.
     """
 
-    def __init__(self, path: Path, copy_of: Path | None = None) -> None:
+    def __init__(self, path: Path, copy_of: Path | None = None, most_bytes: int = MOST_BYTES) -> None:
         self.path = copy_of or path
+        self._most_bytes = most_bytes
         self.losses = Losses()
         with ExitStack() as stack, translated(self.path, _FOREIGN):
             self._plain = path.resolve()
@@ -185,16 +189,19 @@ class Sqlite3File(Closing):
 
     def _data(self, row: Row, topic: _Topic) -> bytes | None:
         """Return the data of a message; None, and name it, if it cannot be used."""
+        cause = SkipCause.DAMAGED
         try:
-            data = self._tables.data(row)
+            data = self._tables.data(row, self._most_bytes)
             if not isinstance(row.log_time_ns, int):
                 raise BadRowError(f"its time is {type(row.log_time_ns).__name__}, not a number")
-            return decompressed_cdr(data)
+            return decompressed_cdr(data, self._most_bytes)
         except BadRowError as error:
             detail = f"it cannot be read: {error}"
         except ZstdError as error:
             detail = f"it cannot be decompressed: {' '.join(str(error).split())}"
-        self.losses.add(Loss(SkipCause.DAMAGED, f"message {row.key}", detail, 1, topic.name))
+        except TooLargeError as error:
+            cause, detail = SkipCause.OVER_MEMORY, str(error)
+        self.losses.add(Loss(cause, f"message {row.key}", detail, 1, topic.name))
         return None
 
     def _check_encodings(self, topics: Iterable[_Topic]) -> None:

@@ -11,7 +11,19 @@ from typing import BinaryIO, NamedTuple, Protocol
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
 from replay.sources.losses import Loss, Losses
-from replay.sources.sqlite3_salvage import BadPageError, Cell, Gap, Header, Leaves, Pages, Table, Value, record_of
+from replay.sources.memory import TooLargeError
+from replay.sources.sqlite3_salvage import (
+    BadPageError,
+    Cell,
+    Gap,
+    Header,
+    Leaves,
+    Pages,
+    Table,
+    Value,
+    layout_of,
+    record_of,
+)
 from replay.sources.topics import normalised_type
 from replay.words import counted
 
@@ -26,7 +38,14 @@ _TIMES = "SELECT min(timestamp), max(timestamp) FROM messages"
 # Slower. The index on time may be damaged, and texts and bytes sort after all numbers.
 _TIMES_THAT_ARE = f"{_TIMES} NOT INDEXED WHERE typeof(timestamp) = 'integer'"
 _ROWS = "SELECT timestamp, id, topic_id FROM messages WHERE topic_id IN ({}) ORDER BY timestamp, id"
-_DATA = "SELECT timestamp, topic_id, data FROM messages WHERE id = ?"
+# To know how long it is, SQLite does not read it.
+_DATA = (
+    "SELECT timestamp, topic_id, length(data) > :most, CASE WHEN length(data) <= :most THEN data END FROM messages "
+    "WHERE id = :key"
+)
+
+# what the record of a message has besides its data, at most
+_MOST_BESIDE_BYTES = 64
 
 
 class Row(NamedTuple):
@@ -69,13 +88,15 @@ class BagTables(Protocol):
     def rows(self, topic_ids: Collection[int]) -> Iterator[Row]:
         """Yield where the messages of these topics are, in order."""
 
-    def data(self, row: Row) -> bytes:
+    def data(self, row: Row, most_bytes: int) -> bytes:
         """Return the data of a message.
 
         Raises
         ------
         BadRowError
             If it is not there.
+        TooLargeError
+            If it is larger than ``most_bytes``.
         """
 
 
@@ -120,17 +141,19 @@ class SqliteTables:
         rows = self._database.execute(_ROWS.format(", ".join("?" * len(topic_ids))), list(topic_ids))
         return map(Row._make, rows)
 
-    def data(self, row: Row) -> bytes:
+    def data(self, row: Row, most_bytes: int) -> bytes:
         """Return the data of a message."""
         try:
-            found = self._database.execute(_DATA, (row.key,)).fetchone()
+            found = self._database.execute(_DATA, {"key": row.key, "most": most_bytes}).fetchone()
         except sqlite3.DatabaseError as error:
             raise BadRowError(" ".join(str(error).split())) from error
         if found is None or found[:2] != (row.log_time_ns, row.topic_id):
             raise BadRowError("the index on time lists it otherwise than it is")
-        if not isinstance(found[2], bytes):
-            raise BadRowError(f"its data is {type(found[2]).__name__}, not bytes")
-        return found[2]
+        if found[2]:
+            raise TooLargeError(most_bytes)
+        if not isinstance(found[3], bytes):
+            raise BadRowError(f"its data is {type(found[3]).__name__}, not bytes")
+        return found[3]
 
     def _records(self, query: str) -> list[Record]:
         rows = self._database.execute(query)
@@ -227,11 +250,14 @@ class SalvagedTables:
             self._found = self._collected(self._found.kept.union(topic_ids))
         return (row for row in self._found.rows if row.topic_id in topic_ids)
 
-    def data(self, row: Row) -> bytes:
+    def data(self, row: Row, most_bytes: int) -> bytes:
         """Return the data of a message."""
+        cell = self._found.cells[row.key]
+        if cell.size - _MOST_BESIDE_BYTES > most_bytes:
+            raise TooLargeError(most_bytes)
         columns = self._tables["messages"].columns
         try:
-            data = record_of(self._pages.payload(self._found.cells[row.key]))[columns.index("data")]
+            data = record_of(self._pages.payload(cell))[columns.index("data")]
         except (BadPageError, IndexError) as error:
             raise BadRowError(str(error)) from error
         if not isinstance(data, bytes):
@@ -269,7 +295,7 @@ class SalvagedTables:
     def _add(self, found: _Found, cell: Cell) -> None:
         try:
             found.add(_row(self._tables["messages"], cell), cell)
-        except (BadPageError, KeyError):
+        except BadPageError:
             self._bad.add(cell.key)
 
     def _name_losses(self, cut: str, missing: str) -> None:
@@ -293,8 +319,12 @@ def _named(table: Table, key: int, record: list[Value]) -> Record:
 
 
 def _row(table: Table, cell: Cell) -> Row:
-    record = _named(table, cell.key, record_of(cell.head, cell.size))
-    time_ns, topic_id = record["timestamp"], record["topic_id"]
+    layout = layout_of(cell.head, cell.size)
+    try:
+        time_ns = layout.value(cell.head, table.columns.index("timestamp"))
+        topic_id = layout.value(cell.head, table.columns.index("topic_id"))
+    except ValueError as error:
+        raise BadPageError("its table has no such column") from error
     if not isinstance(time_ns, int) or not isinstance(topic_id, int):
         raise BadPageError("it is no message")
     return Row(time_ns, cell.key, topic_id)
@@ -303,7 +333,7 @@ def _row(table: Table, cell: Cell) -> Row:
 def _is_message(table: Table, cell: Cell, topic_ids: Collection[Value]) -> bool:
     try:
         return _row(table, cell).topic_id in topic_ids
-    except (BadPageError, KeyError):
+    except BadPageError:
         return False
 
 

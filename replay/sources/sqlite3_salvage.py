@@ -7,6 +7,8 @@ overflow pages are all in the file, are no other row's, and end where the row do
 
 from __future__ import annotations
 
+import functools
+import itertools
 import re
 import sqlite3
 import struct
@@ -180,6 +182,8 @@ class Pages:
 
         That is the row itself if a page is missing or comes twice, and if it is another row's, that other one as well.
         """
+        if cell.local_bytes == cell.size:
+            return set()
         bad: set[int] = set()
         own: set[int] = set()
         try:
@@ -310,7 +314,7 @@ class Pages:
         local_bytes = self._local_bytes(size)
         end = at + local_bytes
         head = page[at : min(end, at + _HEAD_BYTES)]
-        record_sizes(head, size)
+        layout_of(head, size)
         start = (number - 1) * self._header.page_bytes + at
         if local_bytes == size:
             return Cell(key, size, start, local_bytes, 0, head), end
@@ -377,6 +381,9 @@ def _children(page: bytes, start: int, low: int, high: int | None) -> list[tuple
 
 def varint(data: bytes, at: int) -> tuple[int, int]:
     """Return a number of one to nine bytes, and where what follows it begins."""
+    value = data[at]
+    if value < 0x80:
+        return value, at + 1
     value = 0
     for index in range(8):
         byte = data[at + index]
@@ -387,24 +394,55 @@ def varint(data: bytes, at: int) -> tuple[int, int]:
     return (value - (1 << 64) if value >> 63 else value), at + 9
 
 
-def record_sizes(record: bytes, size: int) -> tuple[int, list[int]]:
-    """Return where the values of a record begin, and the kinds of its values.
+class Layout(NamedTuple):
+    """What the header of a record says: the kinds of its values, where each begins, and where the last one ends."""
+
+    kinds: tuple[int, ...]
+    starts: tuple[int, ...]
+
+    def value(self, record: bytes, index: int) -> Value:
+        """Return a value of a record, or of the beginning of one.
+
+        Raises
+        ------
+        BadPageError
+            If there is none, or not all of it is there.
+        """
+        if index >= len(self.kinds) or self.starts[index + 1] > len(record):
+            raise BadPageError("it has too few values")
+        return _value(self.kinds[index], record[self.starts[index] : self.starts[index + 1]])
+
+
+def layout_of(record: bytes, size: int) -> Layout:
+    """Return the layout of a record of this length, of which the beginning is enough.
 
     Raises
     ------
     BadPageError
-        If they do not add up to the record's length.
+        If it has none, or its values do not add up to its length.
     """
-    end, at = varint(record, 0)
+    end, _ = varint(record, 0)
     if not 0 < end <= len(record):
         raise BadPageError("it has no header of a record")
-    kinds = []
-    while at < end:
-        kind, at = varint(record, at)
-        kinds.append(kind)
-    if at != end or end + sum(map(_value_bytes, kinds)) != size:
+    layout = _layout(record[:end])
+    if layout.starts[-1] != size:
         raise BadPageError("its values do not add up to its length")
-    return end, kinds
+    return layout
+
+
+# Most rows of a table begin alike.
+@functools.lru_cache(maxsize=1 << 12)
+def _layout(header: bytes) -> Layout:
+    kinds: list[int] = []
+    _, at = varint(header, 0)
+    try:
+        while at < len(header):
+            kind, at = varint(header, at)
+            kinds.append(kind)
+    except IndexError as error:
+        raise BadPageError("its header ends within a number") from error
+    starts = itertools.accumulate(map(_value_bytes, kinds), initial=len(header))
+    return Layout(tuple(kinds), tuple(starts))
 
 
 def _value_bytes(kind: int) -> int:
@@ -415,17 +453,10 @@ def _value_bytes(kind: int) -> int:
     return 8 if kind == 7 else _INTEGER_SIZES.get(kind, 0)
 
 
-def record_of(record: bytes, size: int | None = None) -> list[Value]:
-    """Return the values of a record; of its beginning, if ``size`` says how long it is, those that are in it."""
-    at, kinds = record_sizes(record, len(record) if size is None else size)
-    values: list[Value] = []
-    for kind in kinds:
-        length = _value_bytes(kind)
-        if at + length > len(record):
-            break
-        values.append(_value(kind, record[at : at + length]))
-        at += length
-    return values
+def record_of(record: bytes) -> list[Value]:
+    """Return the values of a record."""
+    layout = layout_of(record, len(record))
+    return [layout.value(record, index) for index in range(len(layout.kinds))]
 
 
 def _value(kind: int, content: bytes) -> Value:

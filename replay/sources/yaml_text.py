@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from replay.errors import InputError
-from replay.sources.boundary import COMMON, translated
+from replay.sources.boundary import COMMON, OF_LIBRARIES, translated
 
 if TYPE_CHECKING:
     from ruamel.yaml import YAML
@@ -26,7 +26,7 @@ def foreign_errors() -> tuple[type[Exception], ...]:
     """Return what may be raised while a YAML file is read."""
     from ruamel.yaml.error import YAMLError
 
-    return (*COMMON, YAMLError)
+    return (*COMMON, *OF_LIBRARIES, YAMLError)
 
 
 def load_yaml(path: Path) -> object:

@@ -15,6 +15,8 @@ if sys.version_info >= (3, 14):
 else:
     from backports import zstd
 
+from replay.sources.memory import MOST_BYTES, TooLargeError
+
 MAGIC = b"\x28\xb5\x2f\xfd"
 
 _PIECE_BYTES = 1 << 20
@@ -58,7 +60,7 @@ def decompress_file(source: Path, target: Path, beginnings: Sequence[bytes] = (b
     return decompressor.eof
 
 
-def decompressed_cdr(data: bytes, most_bytes: int = 1 << 30) -> bytes:
+def decompressed_cdr(data: bytes, most_bytes: int = MOST_BYTES) -> bytes:
     """Return a message in CDR as it was before a bag with message compression stored it.
 
     No message in CDR begins like compressed data, so that this needs no metadata.
@@ -66,14 +68,16 @@ def decompressed_cdr(data: bytes, most_bytes: int = 1 << 30) -> bytes:
     Raises
     ------
     ZstdError
-        If it was cut off, is damaged, or would be larger than ``most_bytes``, whatever size it says it has.
+        If it was cut off, or is damaged.
+    TooLargeError
+        If it would be larger than ``most_bytes``, whatever size it says it has.
     """
     if not data.startswith(MAGIC):
         return data
     decompressor = zstd.ZstdDecompressor()
     plain = decompressor.decompress(data, most_bytes + 1)
     if len(plain) > most_bytes:
-        raise ZstdError(f"it has more than {most_bytes} bytes")
+        raise TooLargeError(most_bytes)
     if not decompressor.eof:
         raise ZstdError("it ends early")
     return plain

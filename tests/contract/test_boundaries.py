@@ -112,6 +112,12 @@ def _reading(write: Callable[..., Path], name: str, *arguments: Any, **options: 
     return prepare
 
 
+def _compressed(path: Path) -> Path:
+    bags.write_mcap(path)
+    path.write_bytes(zstd.zstd.compress(path.read_bytes()))
+    return path
+
+
 def _read(path: Path) -> tuple[int, tuple[Loss, ...]]:
     """Return how many maps there are, and what is lost."""
     with open_source(path) as source:
@@ -144,7 +150,11 @@ OPEN_BAG, OPEN_FOLDER = (bags.write_rosbag1, "run.bag"), (bags.write_rosbag2, "r
 BOUNDARIES = {
     "bag, opened": Boundary("rosbags.rosbag1.Reader.open", _reading(*OPEN_BAG), (), SYSTEM[:2]),
     "bag, its index": Boundary(
-        "rosbags.rosbag1.reader.Header.get_uint32", _reading(*OPEN_BAG), ("rosbags",), LZ4, "all is read, with a loss"
+        "rosbags.rosbag1.reader.Header.get_uint32",
+        _reading(*OPEN_BAG),
+        ("rosbags",),
+        (AssertionError(), KeyError("conn")),
+        "all is read, with a loss",
     ),
     "mcap, its index": Boundary(
         "mcap.records.ChunkIndex.read", _reading(bags.write_mcap, "run.mcap"), ("mcap",), (), "all is read"
@@ -167,9 +177,18 @@ BOUNDARIES = {
         (),
         "a loss",
     ),
-    "folder, its metadata": Boundary("ruamel.yaml.YAML.load", _reading(*OPEN_FOLDER), ("yaml",), (), "all is read"),
+    "folder, its metadata": Boundary(
+        "ruamel.yaml.YAML.load",
+        _reading(*OPEN_FOLDER),
+        ("yaml",),
+        (IndexError(), KeyError("x")),
+        "all is read, with a loss",
+    ),
     "folder, a part": Boundary(
         f"{ZSTD}.ZstdDecompressor", _reading(*OPEN_FOLDER, compression="file"), ("zstd",), SYSTEM, InputError
+    ),
+    "compressed alone": Boundary(
+        f"{ZSTD}.ZstdDecompressor", _reading(_compressed, "run.mcap"), ("zstd",), SYSTEM, InputError
     ),
     "saved map, its description": Boundary(
         "ruamel.yaml.YAML.load", _reading(bags.write_saved_map, "map.yaml", PIXELS), ("yaml",)
@@ -226,6 +245,36 @@ def test_is_an_error_of_ours_in_one_line(
     assert caught.value.__cause__ is not None
     assert not [each.name for each in threading.enumerate() if each.name == "rrd"]
     assert not [each.name for each in tmp_path.iterdir() if each.name.startswith("out.")]
+
+
+# One function of ours for each source, met when it is opened or read.
+OURS = {
+    "bag": ("replay.sources.rosbag1.topic_table", _reading(*OPEN_BAG)),
+    "bag, its index": ("replay.sources.rosbag1_index._check_chunk_counts", _reading(*OPEN_BAG)),
+    "bag, a message": ("replay.sources.rosbag1._message_at", _reading(*OPEN_BAG)),
+    "mcap": ("replay.sources.mcap_file.topic_table", _reading(bags.write_mcap, "run.mcap")),
+    "mcap, its summary": ("replay.sources.mcap_index._is_complete", _reading(bags.write_mcap, "run.mcap")),
+    "mcap, a message": ("replay.sources.mcap_file.message_header_at", _reading(bags.write_mcap, "run.mcap")),
+    "db3": ("replay.sources.sqlite3_file._topic", _reading(bags.write_bare_db3, "run.db3")),
+    "db3, a message": ("replay.sources.sqlite3_file.decompressed_cdr", _reading(bags.write_bare_db3, "run.db3")),
+    "folder": ("replay.sources.rosbag2_folder.listed_parts", _reading(*OPEN_FOLDER)),
+    "folder, a part": ("replay.sources.rosbag2_folder.plain_copy", _reading(*OPEN_FOLDER)),
+    "compressed": ("replay.sources.compressed_file.plain_copy", _reading(_compressed, "run.mcap")),
+    "saved map": ("replay.sources.map_server._resolution_m", _reading(bags.write_saved_map, "map.yaml", PIXELS)),
+    "saved map, its image": ("replay.sources.image_file.header_of", _reading(bags.write_saved_map, "map.yaml", PIXELS)),
+}
+BUGS = (TypeError(), AttributeError(), KeyError(), IndexError(), AssertionError(), ZeroDivisionError(), RuntimeError())
+
+
+@pytest.mark.parametrize("bug", BUGS, ids=lambda bug: type(bug).__name__)
+@pytest.mark.parametrize("name", OURS)
+def test_a_bug_of_ours_is_no_damage(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str, bug: Exception) -> None:
+    entry, prepare = OURS[name]
+    call = prepare(tmp_path)
+    monkeypatch.setattr(entry, raising(bug))
+    with pytest.raises(type(bug)) as caught:
+        call()
+    assert caught.value is bug
 
 
 @pytest.mark.parametrize("name", BOUNDARIES)

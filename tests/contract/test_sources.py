@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import zstandard
 
 from mapmerge.grid import Grid
 from mapmerge.sim2 import Sim2
@@ -72,6 +73,11 @@ def _formats() -> dict[str, Format]:
     formats["rosbag2-without-metadata"] = Format("rosbag2", _without_metadata)
     for compression in ("none", "message"):
         formats[f"sqlite3-{compression}"] = Format("sqlite3", partial(_bare_db3, compression=compression))
+        formats[f"zstd-sqlite3-{compression}"] = Format(
+            "zstd", partial(_compressed, _bare_db3, compression=compression)
+        )
+    formats["zstd-mcap"] = Format("zstd", partial(_compressed, _mcap))
+    formats["zstd-rosbag1"] = Format("zstd", partial(_compressed, _rosbag1, compression="lz4"))
     for suffix in ("pgm", "png", "bmp"):
         formats[f"map_server-{suffix}"] = Format(
             "map_server", partial(_saved_map, suffix=suffix), (SAVED_MESSAGE,), has_clock=False
@@ -123,6 +129,14 @@ def _without_metadata(folder: Path) -> Path:
 def _bare_db3(folder: Path, **options: Any) -> Path:
     # The name has characters that mean something in the URI of a database.
     return bags.write_bare_db3(folder / "100%23 odd?name#1.db3", **options)
+
+
+def _compressed(write: Callable[..., Path], folder: Path, **options: Any) -> Path:
+    plain = write(folder, **options)
+    path = plain.with_name(f"{plain.name}.zstd")
+    path.write_bytes(zstandard.compress(plain.read_bytes()))
+    plain.unlink()
+    return path
 
 
 def _mcap(folder: Path, **options: Any) -> Path:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import math
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from replay import __version__
@@ -126,7 +129,13 @@ def test_a_bug_ends_with_a_status_and_a_word(replay: Program, two: Path, monkeyp
 
 @pytest.mark.parametrize("jobs", [1, 2])
 @pytest.mark.parametrize(
-    "where", ["replay.sinks.mcap_file.McapSink._tick", "replay.timeline.assemble", "replay.sinks.json_file.report_text"]
+    "where",
+    [
+        "replay.sources.mcap_file.message_data",
+        "replay.sinks.mcap_file.McapSink._tick",
+        "replay.timeline.assemble",
+        "replay.sinks.json_file.report_text",
+    ],
 )
 def test_a_bug_in_any_thread(
     replay: Program, two: Path, monkeypatch: pytest.MonkeyPatch, where: str, jobs: int
@@ -141,6 +150,60 @@ def test_a_bug_in_any_thread(
     assert "please report it" in ran.err.splitlines()[-1]
     assert not list(replay.folder.iterdir())
     assert not {each.name for each in threading.enumerate()} & {"reader", "writer", "rrd"}
+
+
+def no_memory_for_python(*_: object, **__: object) -> object:
+    raise MemoryError
+
+
+def no_memory_for_numpy(*_: object, **__: object) -> object:
+    return np.zeros((1 << 31, 1 << 31), np.uint8)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize(
+    ("where", "expected"),
+    [
+        ("mapmerge.merger.Merger.step", "the maps of r"),
+        ("replay.gallery.Gallery.due", "the maps of r"),
+        ("replay.timeline.assemble", "there is not enough memory"),
+    ],
+)
+@pytest.mark.parametrize("greedy", [no_memory_for_python, no_memory_for_numpy])
+def test_too_little_memory_is_no_bug(
+    replay: Program,
+    two: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    where: str,
+    expected: str,
+    greedy: Callable[..., object],
+    jobs: int,
+) -> None:
+    monkeypatch.setattr(where, greedy)
+    ran = replay("merge", two, "-o", "out.mcap", "--jobs", jobs)
+    assert ran.status == 2
+    last = ran.err.splitlines()[-1]
+    assert last.startswith(f"replay: error: {expected}")
+    assert "not enough memory" in last
+    assert "--max-memory SIZE" in last
+    assert "Traceback" not in ran.err
+    assert not list(replay.folder.iterdir())
+
+
+@pytest.mark.parametrize(("code", "status"), [(cv2.Error.StsNoMem, 2), (cv2.Error.StsAssert, 3)])
+def test_errors_of_opencv_are_bugs_but_for_memory(
+    replay: Program, two: Path, monkeypatch: pytest.MonkeyPatch, code: int, status: int
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        error = cv2.error("OpenCV said so")
+        error.code = code
+        raise error
+
+    monkeypatch.setattr("mapmerge.merger.Merger.step", broken)
+    ran = replay.merge(two)
+    assert ran.status == status
+    assert ("Traceback" in ran.err, "please report it" in ran.err) == (status == 3, status == 3)
+    assert not list(replay.folder.iterdir())
 
 
 def test_a_recording_that_is_damaged_in_the_middle(replay: Program, tmp_path: Path) -> None:

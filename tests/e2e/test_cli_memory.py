@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mapmerge.grid import Grid
-from tests.bags import write_mcap, write_rosbag1
+from tests.bags import write_bare_db3, write_mcap, write_rosbag1, write_rosbag2
 from tests.program import Program
 from tests.runs import flat_map, in_log_order, seen, two_robots, updated
 
@@ -53,6 +53,32 @@ def test_an_update_of_a_map_that_was_not_taken_is_not_put_on_the_one_before(repl
     ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages), "--max-memory", "20MB")
     assert ran.report["skipped"] == {"over_memory": 1, "update_before_grid": 1}
     assert ran.robots["r1"]["updates"] == 3
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda path, messages: write_mcap(path, messages, compression="zstd", chunk_bytes=100_000),
+        lambda path, messages: write_rosbag1(path, messages, "bz2", 100_000),
+        lambda path, messages: write_rosbag2(path, messages, storage="mcap"),
+        lambda path, messages: write_rosbag2(path, messages, compression="message"),
+        lambda path, messages: write_rosbag2(path, messages, storage="mcap", compression="message"),
+        write_bare_db3,
+    ],
+    ids=["mcap", "bag", "folder", "folder of messages", "folder of messages in chunks", "db3"],
+)
+def test_no_more_than_that_is_read_at_once(replay: Program, tmp_path: Path, write) -> None:
+    """Its unknown margins do not count for the map, but it would have to be in memory to see that."""
+    grid = flat_map("r2")
+    padded = Grid(np.pad(grid.cells, 2500, constant_values=-1), grid.resolution_m)
+    run = write(tmp_path / "run", in_log_order(two_robots(), [seen("r2", 13.0, padded)]))
+    ran = replay.merge(run, "--max-memory", "20MB")
+    assert ran.status == 0, ran.err
+    ((cause, detail),) = [(each["cause"], each["detail"]) for each in ran.report["skipped_at"]]
+    assert cause == "over_memory"
+    assert detail.startswith("it has more than 20000000 bytes, the most that is read at once; a larger --max-memory")
+    assert ran.statuses == {"r1": "reference", "r2": "merged"}
+    assert replay.merge(run, "--max-memory", "200MB", "--force").report["skipped"] == {}
 
 
 @pytest.mark.parametrize("text", ["", "2", "-1GB", "1e9", "2 XB", "nan", "GiB", "1023KiB", "٣GB", "2GB 3"])

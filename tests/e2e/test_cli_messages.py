@@ -11,7 +11,7 @@ import pytest
 from mapmerge.grid import Grid
 from mapmerge.sim2 import Sim2
 from replay.skip_cause import SkipCause
-from tests.bags import write_mcap, write_rosbag1, write_rosbag2
+from tests.bags import chunks, damage, write_mcap, write_rosbag1, write_rosbag2
 from tests.outputs import maps, raw, reports, same_map, transforms
 from tests.program import Program
 from tests.runs import (
@@ -40,6 +40,36 @@ def turned(grid: Grid) -> Grid:
     """Return the same map with the grid turned by 90° in the map frame."""
     corner = Sim2(grid.cols * grid.resolution_m, 0.0, np.pi / 2)
     return Grid(np.rot90(grid.cells), grid.resolution_m, grid.map_from_grid @ corner)
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("run.bag", lambda path: write_rosbag1(path, two_robots(), "bz2")),
+        ("run.mcap", lambda path: write_mcap(path, two_robots())),
+    ],
+)
+def test_where_damage_left_no_map_the_error_says_so(replay: Program, tmp_path: Path, name: str, write) -> None:
+    run = write(tmp_path / name)
+    for chunk in chunks(run):
+        damage(run, chunk)
+    # with its index it would seem to have maps
+    run.write_bytes(run.read_bytes()[:-20])
+    ran = replay.merge(run)
+    assert ran.status == 2
+    assert re.search(rf"; lost are .*\d+ messages? \(\w+\), .*first {name}, the chunk at byte \d+: ", ran.error)
+    assert "; lost are " in replay("info", run).out
+
+
+def test_metadata_that_cannot_be_read_is_named(replay: Program, tmp_path: Path) -> None:
+    run = write_rosbag2(tmp_path / "run", two_robots())
+    (run / "metadata.yaml").write_text("rosbag2_bagfile_information: [")
+    ran = replay.merge(run)
+    assert ran.statuses == {"r1": "reference", "r2": "merged"}
+    ((cause, place, lost),) = [(each["cause"], each["place"], each["messages"]) for each in ran.report["skipped_at"]]
+    assert (cause, place, lost) == ("damaged", "metadata.yaml", 0)
+    assert "(run, metadata.yaml): damaged: it cannot be read (ParserError" in ran.err
+    assert "(metadata.yaml): damaged: it cannot be read (ParserError" in replay("info", run).out
 
 
 class TestUpdates:

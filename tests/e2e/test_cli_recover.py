@@ -134,6 +134,26 @@ def test_a_damaged_chunk_is_left_out_and_named(replay: Program, tmp_path: Path) 
     assert re.search(r"left out: .*run\.mcap: the chunk at byte \d+ is damaged: its checksum \(CRC\) is wrong", ran.err)
 
 
+@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.NONE])
+@pytest.mark.parametrize("is_chunked", [True, False])
+def test_what_is_larger_than_is_read_is_left_out_and_named(
+    replay: Program, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, compression: CompressionType, is_chunked: bool
+) -> None:
+    monkeypatch.setattr("replay.recover.MOST_BYTES", 20_000)
+    run = tmp_path / "run.mcap"
+    with run.open("wb") as file:
+        writer = Writer(file, chunk_size=1, compression=compression, use_chunking=is_chunked)
+        writer.start()
+        channel = writer.register_channel("/a", "json", writer.register_schema("s", "jsonschema", b"{}"))
+        for time_ns, size in enumerate((10, 30_000, 10)):
+            writer.add_message(channel, time_ns, bytes(size), time_ns)
+        writer.finish()
+    ran = replay("recover", run, "-o", "out.mcap")
+    assert ran.status == 0, ran.err
+    assert len(messages_of(tmp_path / "out.mcap")) == 2
+    assert re.search(r"left out: .*run\.mcap: the (chunk|record) at byte \d+ has more than 20000 bytes", ran.err)
+
+
 def test_default_names(replay: Program, tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     recorded(tmp_path / "there" / "run.mcap")

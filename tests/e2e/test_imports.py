@@ -32,6 +32,32 @@ def test_help_imports_nothing_heavy(arguments: tuple[str, ...]) -> None:
     assert not loaded(code) & HEAVY
 
 
+QUIET = "import contextlib, io\nfrom replay.cli import main\nwith contextlib.redirect_stdout(io.StringIO()):\n    "
+RUN = ROOT / "samples" / "two_robots.mcap"
+
+
+def test_info_imports_nothing_that_merges() -> None:
+    found = loaded(f"{QUIET}main(['info', {str(RUN)!r}])")
+    assert {"numpy", "rosbags"} <= found
+    assert not found & {"cv2", "rerun", "rich", "ruamel", "lz4"}
+
+
+def test_recovering_imports_nothing_that_knows_maps(tmp_path_factory: pytest.TempPathFactory) -> None:
+    new = tmp_path_factory.mktemp("out") / "new.mcap"
+    code = "with contextlib.redirect_stderr(io.StringIO()):\n        "
+    found = loaded(f"{QUIET}{code}main(['recover', {str(RUN)!r}, '-o', {str(new)!r}])")
+    assert "mcap" in found
+    assert not found & {"cv2", "rosbags", "rerun", "rich", "ruamel"}
+
+
+def test_all_that_mapmerge_offers_is_there() -> None:
+    import mapmerge
+
+    assert [getattr(mapmerge, name).__name__ for name in mapmerge.__all__] == mapmerge.__all__
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = mapmerge.nothing
+
+
 def test_mapmerge_stands_alone() -> None:
     assert not loaded("import mapmerge") & {"replay", "rosbags", "mcap", "rerun", "rich"}
 

@@ -7,7 +7,9 @@ import pytest
 from replay.errors import InputError, UsageError
 from replay.runs import RunPath, TopicChoice
 from replay.selection import Selected, select
+from replay.skip_cause import SkipCause
 from replay.sources.base import UPDATE_TYPE, SourceInfo
+from replay.sources.losses import Loss
 from tests.fakes import info_of
 
 RUN = RunPath(None, Path("run.mcap"))
@@ -137,6 +139,25 @@ class TestRefusals:
         assert str(refused.value).startswith(r"run.mcap: no map, only int32 sec\nuint32 nanosec\n")
         assert "…; expected a topic of type" in str(refused.value)
         assert len(str(refused.value)) < 300
+
+    def test_no_map_is_left(self) -> None:
+        found = (
+            Loss(SkipCause.DAMAGED, "the index", "messages were found without it", 0),
+            Loss(SkipCause.WRONG_CHECKSUM, "the chunk at byte 12", "its checksum is wrong", 3),
+            Loss(SkipCause.DAMAGED, "byte 99", "no record", 1),
+            Loss(SkipCause.WRONG_CHECKSUM, "the chunk at byte 50", "its checksum is wrong"),
+        )
+        with pytest.raises(InputError) as caught:
+            topics(info_of(), info_of(), losses=[(), found])
+        assert str(caught.value).endswith(
+            "such as /r1/map; lost are at least 4 messages (wrong_checksum), 1 message (damaged), first run.mcap, "
+            "the chunk at byte 12: its checksum is wrong"
+        )
+
+    def test_what_is_damaged_and_cost_nothing_is_not_why(self) -> None:
+        with pytest.raises(InputError) as caught:
+            topics(info_of(), losses=[(Loss(SkipCause.DAMAGED, "the index", "messages were found without it", 0),)])
+        assert str(caught.value).endswith("such as /r1/map")
 
     def test_no_message(self) -> None:
         with pytest.raises(InputError):

@@ -7,6 +7,7 @@ import gzip
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -70,12 +71,35 @@ def test_file_that_is_no_recording(tmp_path: Path) -> None:
     ("content", "hint"),
     [
         (gzip.compress(b"x"), "unpack it"),
-        (b"\x28\xb5\x2f\xfd....", "zstd -d"),
+        (zstandard.compress(b"x"), "zstd -d"),
+        (zstandard.compress(zstandard.compress(b"x")), "zstd -d"),
+        (b"\x28\xb5\x2f\xfd....", "copy it again"),
+        (zstandard.compress(bytes(1000))[:8], "ends early at byte 8"),
         (b"P5\n2 2\n255\n....", ".yaml"),
     ],
 )
 def test_file_that_can_be_made_one_says_how(tmp_path: Path, content: bytes, hint: str) -> None:
     refused(_written(tmp_path / "a.bag", content), hint)
+
+
+def test_a_compressed_file_that_ends_early_is_read_as_far_as_it_goes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    plain = bags.write_mcap(tmp_path / "a.mcap", compression="none").read_bytes()
+    for share in (0.5, 0.9):
+        # in several blocks, because of one that is cut off there is nothing
+        pieces = [zstandard.compress(plain[start : start + 2000]) for start in range(0, len(plain), 2000)]
+        whole = b"".join(pieces)
+        path = _written(tmp_path / "a.mcap.zst", whole[: int(share * len(whole))])
+        with open_source(path) as source:
+            found = len(list(source.messages(["/r1/map", "/r2/map"])))
+            assert len(list(temporary.iterdir())) == 1
+            assert [each.cause for each in source.losses.all] == ["ends_early"]
+        assert found > 0
+        assert not list(temporary.iterdir())
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such file")
@@ -213,7 +237,7 @@ def test_a_new_format_is_one_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     path = _written(tmp_path / "a.new", b"NEWFORMAT")
     (tmp_path / "new_format.py").write_text(
         "class NewFile:\n"
-        "    def __init__(self, path): self.path = path\n"
+        "    def __init__(self, path, *, most_bytes): self.path = path\n"
         "    @classmethod\n"
         "    def recognises(cls, path, head): return head.startswith(b'NEWFORMAT')\n"
     )

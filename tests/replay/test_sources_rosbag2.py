@@ -239,11 +239,27 @@ def test_another_compression(tmp_path: Path) -> None:
     refused(path, "'lz4'", "zstd", "ros2 bag convert")
 
 
-@pytest.mark.parametrize("text", ["", "a: [", "- 1", "rosbag2_bagfile_information: 3", "\x00", "\xff\xfe"])
-def test_metadata_that_is_none_says_no_more_than_the_files(tmp_path: Path, text: str) -> None:
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("", "it has no 'rosbag2_bagfile_information'"),
+        ("a: [", "it cannot be read (ParserError: "),
+        ("- 1", "it has no 'rosbag2_bagfile_information'"),
+        ("rosbag2_bagfile_information: 3", "it has no 'rosbag2_bagfile_information'"),
+        ("rosbag2_bagfile_information:\n  version: 9", "it lists no files"),
+        ("rosbag2_bagfile_information:\n  relative_file_paths: a.db3", "it lists no files"),
+        ("\x00", "it cannot be read (ReaderError: "),
+        ("\xff\xfe", "it cannot be read (UnicodeDecodeError: "),
+    ],
+)
+def test_metadata_that_is_none_says_no_more_than_the_files_and_is_named(tmp_path: Path, text: str, found: str) -> None:
     path = bags.write_split_rosbag2(tmp_path / "bag")
     (path / "metadata.yaml").write_bytes(text.encode("latin-1"))
-    assert _read(path) == (_recorded(bags.SAMPLE), [])
+    assert _read(path) == (_recorded(bags.SAMPLE), [("damaged", "metadata.yaml", 0)])
+    with open_source(path) as source:
+        (loss,) = source.losses.all
+    assert loss.detail.startswith(found)
+    assert loss.detail.endswith("; all bag files of the folder are taken for parts of the recording")
 
 
 def test_metadata_without_any_file(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from replay.errors import InputError
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE
 from replay.sources.losses import Loss
+from replay.sources.sqlite3_salvage import BadPageError, layout_of
 from tests import bags
 from tests.replay.test_sources_open import refused
 
@@ -387,6 +388,24 @@ def _page_of(whole: bytes, data: bytes) -> int:
 # --- whole files
 
 
+@pytest.mark.parametrize("compression", ["none", "message"])
+@pytest.mark.parametrize("is_cut", [False, True], ids=["whole", "cut off"])
+def test_a_message_that_is_larger_than_is_read_is_named(tmp_path: Path, compression: str, is_cut: bool) -> None:
+    messages = [bags.recorded_map("/r1/map", bags.START + number, seed=number) for number in range(6)]
+    messages[2] = bags.recorded_map("/r1/map", bags.START + 2, seed=2, rows=400)
+    path = bags.write_bare_db3(tmp_path / "a.db3", messages, compression=compression)
+    if is_cut:
+        path.write_bytes(path.read_bytes()[:-100])
+    with open_source(path, most_bytes=10_000) as source:
+        found = [each.log_time_ns - bags.START for each in source.messages(["/r1/map"])]
+        losses = [each for each in source.losses.all if each.cause == "over_memory"]
+    assert 2 not in found
+    assert {0, 1, 3} < set(found)
+    (loss,) = losses
+    assert (loss.messages, loss.topic, loss.place) == (1, "/r1/map", "message 3")
+    assert loss.detail.startswith("it has more than 10000 bytes")
+
+
 def test_without_an_index_on_time(tmp_path: Path) -> None:
     path = bags.write_bare_db3(tmp_path / "a.db3")
     with closing(sqlite3.connect(path)) as database:
@@ -401,3 +420,33 @@ def test_without_an_index_on_time(tmp_path: Path) -> None:
 def test_database_without_messages(tmp_path: Path) -> None:
     with open_source(bags.write_bare_db3(tmp_path / "a.db3", [])) as source:
         assert (source.info.start_ns, source.info.topics) == (None, ())
+
+
+# --- the layout of a row
+
+
+def test_values_of_the_beginning_of_a_record() -> None:
+    # kinds: none, a number of 1 byte, one of 8 bytes
+    record = bytes([4, 0, 1, 6]) + b"\x07" + (9).to_bytes(8, "big")
+    layout = layout_of(record[:9], 13)
+    assert layout.kinds == (0, 1, 6)
+    assert (layout.value(record[:9], 0), layout.value(record[:9], 1)) == (None, 7)
+    assert layout.value(record, 2) == 9
+    for index in (2, 3):
+        with pytest.raises(BadPageError):
+            layout.value(record[:9], index)
+
+
+@pytest.mark.parametrize(
+    ("record", "size"),
+    [
+        (bytes([4, 0, 1, 6]), 12),  # values of another length
+        (bytes([0, 0, 1, 6]), 13),  # no header
+        (bytes([9, 0, 1, 6]), 13),  # a header that is not all there
+        (bytes([3, 0, 0x81, 6]), 3),  # one that ends within a number
+        (bytes([3, 0, 10]), 3),  # a value of no kind
+    ],
+)
+def test_what_is_no_record(record: bytes, size: int) -> None:
+    with pytest.raises(BadPageError):
+        layout_of(record, size)
