@@ -1,7 +1,6 @@
 """What becomes of damaged recordings, and whether a wrong outcome would be noticed."""
 
 import sys
-from collections import OrderedDict
 from dataclasses import replace
 
 import numpy as np
@@ -21,8 +20,9 @@ from benchmarks.faults.world import FLOOR_FROM_MAP, changed, messages, robot_map
 from mapmerge.grid import Grid
 from mapmerge.merger import Merger
 from mapmerge.sim2 import Sim2
+from replay.codec import decode
 from replay.sources import open_source
-from replay.sources.base import RawMessage
+from replay.sources.base import GRID_TYPE, RawMessage
 from replay.sources.mcap_file import McapFile
 
 SEED = 7
@@ -179,7 +179,7 @@ class TestFakeFailures:
             return replace(result, robots=robots)
 
         monkeypatch.setattr(Merger, "step", shifted)
-        monkeypatch.setattr(remembered, "_known", OrderedDict())
+        monkeypatch.setattr(remembered, "_known", remembered.Known())
         judged = run_one()
         assert judged.verdict is Verdict.WRONG
         assert "r2 is placed 0.5" in judged.why
@@ -244,6 +244,43 @@ class TestPlacement:
         wide = Grid(robot_map("r2", 2).cells, 0.2)
         true = FLOOR_FROM_MAP["r1"].inverse() @ FLOOR_FROM_MAP["r2"]
         assert placement.error_of("r1", robot_map("r1", 2), "r2", wide, true)
+
+
+class TestReal:
+    """Recordings of which a file beside says where maps lie."""
+
+    ERROR = staticmethod(FORMATS["sample_mcap"].real.error_of)
+
+    @pytest.fixture
+    def last(self):
+        """The last map of each robot."""
+        found = {}
+        for raw in FORMATS["sample_mcap"].raw(()):
+            if raw.msgtype == GRID_TYPE:
+                found[raw.topic.split("/")[1]] = decode(raw).grid
+        return found
+
+    def test_a_map_lies_where_the_file_says(self, last):
+        true = Sim2(28.162, 0.906, 2.18)
+        target, source = ("r1", last["r1"]), ("r2", last["r2"])
+        assert self.ERROR(target, source, true) == ""
+        assert self.ERROR(source, target, true.inverse()) == ""
+        assert "m and" in self.ERROR(target, source, Sim2(0.8) @ true)
+        assert self.ERROR(target, source, true.inverse())
+
+    def test_it_is_known_by_its_cells_whatever_its_name_corner_and_shift(self, last):
+        true = Sim2(28.162, 0.906, 2.18)
+        cells, cell_m = last["r2"].cells, last["r2"].resolution_m
+        moved = Grid(np.roll(cells.reshape(-1), 40).reshape(cells.shape), cell_m, last["r2"].map_from_grid)
+        corner = Grid(cells, cell_m, Sim2(3.0, 4.0, 0.5))
+        target = ("r1", last["r1"])
+        assert self.ERROR(target, ("r7", last["r2"]), true) == ""
+        assert self.ERROR(target, ("r2", corner), true) != ""
+        assert (
+            self.ERROR(target, ("r2", corner), true @ last["r2"].map_from_grid @ corner.map_from_grid.inverse()) == ""
+        )
+        assert self.ERROR(target, ("r2", moved), true @ Sim2(-40 * cell_m)) == ""
+        assert self.ERROR(target, ("r2", moved), true) != ""
 
 
 class TestFormats:
@@ -384,7 +421,7 @@ def test_equal_steps_are_merged_once(monkeypatch):
     merges = []
     step = Merger.step
     monkeypatch.setattr(Merger, "step", lambda *given, **named: merges.append(1) or step(*given, **named))
-    monkeypatch.setattr(remembered, "_known", OrderedDict())
+    monkeypatch.setattr(remembered, "_known", remembered.Known())
     for _ in range(2):
         worker.undamaged_run.cache_clear()
         worker.undamaged_run("mcap_none")
@@ -392,8 +429,6 @@ def test_equal_steps_are_merged_once(monkeypatch):
 
 
 def test_messages_are_laid_out_as_the_library_does():
-    from replay.codec import decode
-
     for each in messages():
         if each.topic != "/chatter":
             one, other = (
