@@ -10,7 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.faults.pieces import alike, shifts
-from benchmarks.faults.world import FLOOR_FROM_MAP, PARTS_M, RESOLUTION_M, STRANGER, robot_map
+from benchmarks.faults.world import (
+    FLOOR_FROM_MAP,
+    ODD_BUILDINGS,
+    PARTS_M,
+    RESOLUTION_M,
+    STRANGER,
+    drawn_map,
+    robot_map,
+)
 from mapmerge.grid import Grid
 from mapmerge.sim2 import Sim2, wrap_angle
 from replay.events import Merged
@@ -86,12 +94,18 @@ def _shown(grid: Grid, name: str) -> list[_Shown]:
 
 def _alike(grid: Grid, robot: str) -> float:
     """Return the largest share of cells that are the same in one of a robot's maps, of those known in either."""
-    return max(alike(grid.cells, cells) for cells in _all_cells(robot))
+    odd = [] if robot == STRANGER else _odd_cells(robot)
+    return max(alike(grid.cells, cells) for cells in (*_all_cells(robot), *odd))
 
 
 @functools.cache
 def _all_cells(robot: str) -> list[np.ndarray]:
     return [robot_map(robot, part).cells for part in range(len(PARTS_M))]
+
+
+@functools.cache
+def _odd_cells(robot: str) -> list[np.ndarray]:
+    return [drawn_map(robot, len(PARTS_M) - 1, walls).cells for walls in ODD_BUILDINGS]
 
 
 def _pieces(grid: Grid, robot: str) -> Iterator[_Shown]:

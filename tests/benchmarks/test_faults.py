@@ -1,22 +1,35 @@
 """What becomes of damaged recordings, and whether a wrong outcome would be noticed."""
 
+import bz2
 import sys
 from dataclasses import replace
+from random import Random
 
+import lz4.frame
 import numpy as np
 import pytest
 
 from benchmarks.faults import __main__ as command
-from benchmarks.faults import placement, remembered, whole_runs, worker
+from benchmarks.faults import bombs, placement, remembered, whole_runs, worker
 from benchmarks.faults.cases import Case, Task, cases
 from benchmarks.faults.formats import FORMATS, undamaged
 from benchmarks.faults.mcap_layout import closed, parsed
+from benchmarks.faults.messages import MapContent
 from benchmarks.faults.oracle import FAILURES, Expected, Judged, Verdict, judge
 from benchmarks.faults.pool import Worker, run_all
 from benchmarks.faults.printed import Counts
 from benchmarks.faults.runner import Named, Ran, Used
 from benchmarks.faults.table import FAULTS
-from benchmarks.faults.world import FLOOR_FROM_MAP, changed, messages, robot_map
+from benchmarks.faults.world import (
+    BARE_ROOM,
+    FLOOR_FROM_MAP,
+    SQUARE_ROOM,
+    changed,
+    drawn_map,
+    messages,
+    robot_map,
+    robot_of,
+)
 from mapmerge.grid import Grid
 from mapmerge.merger import Merger
 from mapmerge.sim2 import Sim2
@@ -24,6 +37,7 @@ from replay.codec import decode
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE, RawMessage
 from replay.sources.mcap_file import McapFile
+from replay.sources.zstd import zstd
 
 SEED = 7
 # Variants that once ended wrongly, by seed.
@@ -55,6 +69,13 @@ ONE, TWO, OTHER = Used("/r1/map", 1, "aa"), Used("/r2/map", 2, "bb"), Used("/r2/
 EXPECTED = Expected(frozenset({ONE, TWO}), ("r1", "r2", "dd"), "run.mcap", ("r1", "r2"), is_checked=True)
 RIGHT = Ran(used=(ONE, TWO), merged=("r1", "r2", "dd"))
 LOST = Ran(used=(ONE,), merged=("r1",))
+
+
+@pytest.fixture(autouse=True)
+def small_bombs(monkeypatch):
+    """Those that are tried take seconds to be made."""
+    monkeypatch.setattr(bombs, "SIZES", (1 << 24,))
+    monkeypatch.setattr(bombs, "_FILE_BYTES", 1 << 24)
 
 
 def said(messages=1):
@@ -314,6 +335,103 @@ class TestCases:
     def test_a_name_that_is_none(self, name):
         with pytest.raises(ValueError, match="is no case"):
             Case.named(name, SEED)
+
+
+class TestBombs:
+    @pytest.mark.parametrize(
+        ("zeros", "decompress"),
+        [
+            (bombs.zeros_zstd, zstd.decompress),
+            (bombs.zeros_lz4, lz4.frame.decompress),
+            (bombs.zeros_bz2, bz2.decompress),
+        ],
+    )
+    def test_are_small_and_grow(self, zeros, decompress):
+        size = 1 << 24
+        assert decompress(zeros(size)) == bytes(size)
+        assert len(zeros(size)) < size // 100
+
+    @pytest.mark.parametrize("kind", [name for name, each in FORMATS.items() if each.compression and not each.real])
+    def test_take_the_place_of_something_in_every_format_that_is_compressed(self, kind):
+        judged = worker.answer(Task(Case(kind, "bomb", 0, SEED)))
+        assert judged.verdict in {Verdict.RIGHT, Verdict.NAMED, Verdict.ERROR}, judged.why
+        assert Case(kind, "bomb", 0, SEED).variant().recording != undamaged(kind)
+
+
+class TestOddMaps:
+    TRUE = FLOOR_FROM_MAP["r1"].inverse() @ FLOOR_FROM_MAP["r2"]
+
+    def maps(self, name, number=0):
+        told = Case("mcap_none", name, number, SEED).variant().told
+        return {
+            robot_of(each.topic): Grid(
+                np.frombuffer(each.content.cells, np.int8).reshape(each.content.height, each.content.width), 0.15
+            )
+            for each in told
+            if isinstance(each.content, MapContent)
+        }
+
+    def test_symmetric_rooms_look_the_same_turned_by_half_and_lie_at_one_place(self):
+        for walls in (BARE_ROOM, SQUARE_ROOM):
+            room = drawn_map("r1", 2, walls).cells
+            rows, cols = np.nonzero(room >= 0)
+            inside = room[rows.min() : rows.max() + 1, cols.min() : cols.max() + 1]
+            turned = inside[::-1, ::-1]
+            assert np.mean((inside == 0) == (turned == 0)) > 0.9
+            target, source = Grid(room, 0.15), drawn_map("r2", 2, walls)
+            assert placement.error_of("r1", target, "r2", source, self.TRUE) == ""
+            centre = Sim2(4.5, 3.0)
+            about = FLOOR_FROM_MAP["r1"].inverse() @ centre @ Sim2(yaw_rad=np.pi) @ centre.inverse()
+            assert placement.error_of("r1", target, "r2", source, about @ FLOOR_FROM_MAP["r2"])
+
+    def test_identical_maps_lie_on_each_other(self):
+        one = robot_map("r1", 2)
+        assert placement.error_of("r1", one, "r2", one, Sim2()) == ""
+        found = self.maps("maps_identical")
+        same = [(a, b) for a in found for b in found if a < b and np.array_equal(found[a].cells, found[b].cells)]
+        assert len(same) == 1
+
+    def test_a_mirrored_map_lies_nowhere_else(self):
+        mirrored = Grid(robot_map("r2", 2).cells[::-1], 0.15)
+        assert placement.error_of("r1", robot_map("r1", 2), "r2", mirrored, Sim2(3.0, 1.0, 0.5))
+        changed_ones = [
+            robot
+            for robot, grid in self.maps("maps_mirrored").items()
+            if np.array_equal(grid.cells[::-1], robot_map(robot, 2).cells)
+        ]
+        assert len(changed_ones) == 1
+
+    def test_a_map_over_the_memory_is_named(self):
+        judged = worker.answer(Task(Case("mcap_zstd", "message_over_memory", 0, SEED), program=True))
+        assert judged.verdict is Verdict.NAMED
+        assert "over_memory" in judged.why
+
+
+class TestWholeRuns:
+    @pytest.mark.parametrize("name", ["run_interrupted", "run_on_small_disk", "run_on_read_only_disk"])
+    def test_end_in_one_line(self, name, tmp_path):
+        judged = whole_runs.MISFORTUNES[name](Random(3), tmp_path)  # noqa: S311
+        if judged is None:
+            pytest.skip("nobody may have a disk of their own here")
+        assert judged.verdict in {Verdict.ERROR, Verdict.RIGHT}, judged.why
+
+    def test_none_writes_over_its_input(self, tmp_path):
+        for seed in range(4):
+            judged = whole_runs.into_its_input(Random(seed), tmp_path / str(seed))  # noqa: S311
+            assert judged.verdict is Verdict.ERROR
+            assert "is an input" in judged.why
+
+    def test_are_tried_as_often_as_is_said(self, monkeypatch):
+        def never(*_):
+            return None
+
+        def always(*_):
+            return Judged(Verdict.RIGHT)
+
+        monkeypatch.setattr(whole_runs, "MISFORTUNES", {"one": never, "other": always})
+        monkeypatch.setattr(whole_runs, "killed_runs", lambda *_: [])
+        assert [name for name, _ in whole_runs.tried(3, SEED)] == ["other"] * 3
+        assert list(whole_runs.tried(0, SEED)) == []
 
 
 def cases_of(count):
