@@ -24,7 +24,10 @@ from mapmerge.sim2 import Sim2, wrap_angle
 from replay.events import Merged
 
 MOST_M, MOST_DEG = 0.30, 3.0
-"""Two cells: what may come of a map of which a part is damaged."""
+"""Two cells."""
+MOST_OF_DAMAGED_M = 0.60
+"""Of a map of which a part lies elsewhere than the rest: what fits both best may lie between them."""
+_WHOLE = 0.99
 _LEAST_ALIKE = 0.8
 
 
@@ -56,10 +59,11 @@ def error_of(reference: str, target: Grid, robot: str, source: Grid, target_from
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
-    """Whose map a grid shows, or a piece of it, and by how many columns and rows it is shifted."""
+    """Whose map a grid shows, or a piece of it, by how many columns and rows it is shifted, and whether that is all."""
 
     robot: str
     shift: tuple[int, int] = (0, 0)
+    is_whole: bool = False
 
 
 def _error(true_target: _Shown, target: Grid, true_source: _Shown, source: Grid, target_from_source: Sim2) -> str:
@@ -75,7 +79,8 @@ def _error(true_target: _Shown, target: Grid, true_source: _Shown, source: Grid,
     off_m = float(np.hypot(*(found_m[0] / target.resolution_m - true_cell))) * RESOLUTION_M
     yaw_rad = target_from_source.yaw_rad + source.map_from_grid.yaw_rad - target.map_from_grid.yaw_rad
     off_deg = abs(math.degrees(wrap_angle(yaw_rad - true.yaw_rad)))
-    return "" if off_m <= MOST_M and off_deg <= MOST_DEG else f"{off_m:.2f} m and {off_deg:.1f}° from where it lies"
+    most_m = MOST_M if true_target.is_whole and true_source.is_whole else MOST_OF_DAMAGED_M
+    return "" if off_m <= most_m and off_deg <= MOST_DEG else f"{off_m:.2f} m and {off_deg:.1f}° from where it lies"
 
 
 def _shown(grid: Grid, name: str) -> list[_Shown]:
@@ -87,7 +92,7 @@ def _shown(grid: Grid, name: str) -> list[_Shown]:
     same = {robot: _alike(grid, robot) for robot in FLOOR_FROM_MAP}
     best = max(same, key=lambda robot: same[robot])
     if same[best] >= _LEAST_ALIKE:
-        return [_Shown(best)]
+        return [_Shown(best, is_whole=same[best] >= _WHOLE)]
     known = name if name in FLOOR_FROM_MAP else best
     return [each for robot in FLOOR_FROM_MAP for each in _pieces(grid, robot)] or [_Shown(known)]
 

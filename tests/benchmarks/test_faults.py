@@ -59,6 +59,7 @@ FOUND = [
     (5, "mcap_no_crc/block_removed/0"),
     (5, "bag_lz4_unchecked/block_removed/2"),
     (6, "mcap_folder/blocks_swapped/1"),
+    (8, "mcap_no_crc/block_removed/0"),
     (3, "mcap_folder/truncated/0"),
     (3, "db3_folder/db3_row_time_wrong/0"),
     (3, "db3_split/db3_pages_swapped/1"),
@@ -238,6 +239,7 @@ class TestPlacement:
         true = FLOOR_FROM_MAP["r1"].inverse() @ FLOOR_FROM_MAP["r2"] @ moved.map_from_grid.inverse()
         target = robot_map("r1", 2)
         assert placement.error_of("r1", target, "r3", moved, true) == ""
+        assert placement.error_of("r1", target, "r3", moved, true @ Sim2(0.32))
         assert "m and" in placement.error_of("r1", target, "r3", moved, true @ Sim2(0.4))
         assert "°" in placement.error_of("r1", target, "r2", moved, true @ Sim2(yaw_rad=0.1))
         assert "of r3" in placement.error_of("r1", target, "r2", robot_map("r3", 2), true)
@@ -258,6 +260,7 @@ class TestPlacement:
         target, source = robot_map("r1", 2), Grid(cells, 0.15)
         assert placement.error_of("r1", target, "r2", source, true) == ""
         assert placement.error_of("r1", target, "r2", source, true @ Sim2(12 * 0.15)) == ""
+        assert placement.error_of("r1", target, "r2", source, true @ Sim2(-6 * 0.15))
         assert placement.error_of("r1", target, "r2", source, true @ Sim2(6 * 0.15))
         assert placement.error_of("r1", target, "r2", source, true @ Sim2(yaw_rad=1.0))
 
