@@ -6,13 +6,13 @@ what is left, in a process with little memory and little time. What came of it i
 ::
 
     world, messages            what is recorded: maps of a flat, of which the truth is known, as bytes
-    formats                    in which formats
+    formats, real              in which formats; recordings that are there already
     table                      the faults, one row each
-    bytes_, mcap_, bag_, db3_, folder_, message_damage, mcap_layout
+    bytes_, mcap_, bag_, db3_, folder_, message_damage, degenerate_maps, bombs, mcap_layout
                                what they do
     cases                      which variants are tried, each with a name
     runner, remembered         one replay, with all that is to be judged
-    placement, oracle          where maps truly lie; the verdict
+    placement, pieces, oracle  where maps truly lie, also those of which cells were moved; the verdict
     worker, pool               processes with limits
     kills, whole_runs          misfortunes of whole runs
     printed                    the table of verdicts

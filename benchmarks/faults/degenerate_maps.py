@@ -11,14 +11,23 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.faults.messages import MapContent, Message
-from benchmarks.faults.world import BARE_ROOM, PARTS_M, SQUARE_ROOM, STRANGER, Box, drawn_map, indices_of_maps, robot_of
+from benchmarks.faults.world import (
+    BARE_ROOM,
+    CORRIDOR,
+    ONE_WALL,
+    PARTS_M,
+    SQUARE_ROOM,
+    STRANGER,
+    Box,
+    drawn_map,
+    indices_of_maps,
+    robot_of,
+)
 from mapmerge.grid import Grid
 from samples.world import Rng
 
 Messages = Sequence[Message]
 
-_ONE_WALL: tuple[Box, ...] = ((-0.15, 3.0, 9.15, 3.15),)
-_CORRIDOR: tuple[Box, ...] = ((-0.15, 2.1, 9.15, 2.25), (-0.15, 3.9, 9.15, 4.05))
 _LARGE_CELLS = 1500
 
 
@@ -46,7 +55,7 @@ def one_row(recorded: Messages, rng: Rng) -> Messages:
 
 def one_wall(recorded: Messages, rng: Rng) -> Messages:
     """Let maps show one wall, or a corridor without ends: nothing tells where along it a map lies."""
-    return _in_building(recorded, rng, (_ONE_WALL, _CORRIDOR))
+    return _in_building(recorded, rng, (ONE_WALL, CORRIDOR))
 
 
 def symmetric(recorded: Messages, rng: Rng) -> Messages:
@@ -62,7 +71,9 @@ def identical(recorded: Messages, rng: Rng) -> Messages:
     others = {id(each): index for index, each in enumerate(each for each in maps if robot_of(each.topic) == other)}
     result = []
     for each in recorded:
-        content = own[min(others[id(each)], len(own) - 1)].content if id(each) in others else each.content
+        # the last ones are the same, however many there are
+        at = others[id(each)] - len(others) if id(each) in others else 0
+        content = own[max(at, -len(own))].content if at else each.content
         if isinstance(content, MapContent) and isinstance(each.content, MapContent):
             content = replace(content, stamp_ns=each.content.stamp_ns)
         result.append(replace(each, content=content))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -10,6 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
 from benchmarks.faults.messages import Message
+from benchmarks.faults.real import ROOT, Real, data_folder, raw_messages
 from benchmarks.faults.world import messages
 from replay.codec import ros1_typestore, ros2_message_definition, ros2_typestore
 from replay.sources.base import RawMessage
@@ -73,6 +75,8 @@ class Format:
         What is compressed.
     is_folder, is_split
         Whether it is a folder; whether there are several parts.
+    real
+        The recording, where it is one that is there already rather than one of the small world.
     """
 
     write: Write
@@ -85,6 +89,7 @@ class Format:
     compressed: Literal["chunks", "messages", "files"] = "chunks"
     is_folder: bool = False
     is_split: bool = False
+    real: Real | None = None
 
     @property
     def is_compressed(self) -> bool:
@@ -100,7 +105,9 @@ class Format:
             return Recording({str(each.relative_to(folder)): each.read_bytes() for each in sorted(files)}, self.main)
 
     def raw(self, what: Sequence[Message]) -> list[RawMessage]:
-        """Return these messages as a source should yield them."""
+        """Return these messages as a source should yield them; those of a recording that is there, whatever is said."""
+        if self.real is not None:
+            return list(raw_messages(self.real.path))
         ordered = sorted(what, key=lambda each: each.log_time_ns)
         return [
             RawMessage(each.topic, each.msgtype, self.encoding, each.log_time_ns, each.data(self.encoding))
@@ -236,7 +243,7 @@ def _bare_db3(path: Path, what: Sequence[Message]) -> None:
 
 
 _CHECKED: dict[str, Any] = {"is_checked": True, "are_names_checked": True}
-FORMATS: Mapping[str, Format] = {
+_WORLD: Mapping[str, Format] = {
     "bag_none": Format(_bag("none"), "run.bag", "bag", "ros1"),
     "bag_bz2": Format(_bag("bz2"), "run.bag", "bag", "ros1", is_checked=True, compression="bz2"),
     # rosbag checks what it compresses with lz4, the writer of rosbags does not
@@ -265,3 +272,35 @@ FORMATS: Mapping[str, Format] = {
         _folder("sqlite3", "message"), "run", "db3", compression="zstd", compressed="messages", is_folder=True
     ),
 }
+
+
+def _copied(path: Path) -> Write:
+    def write(target: Path, what: Sequence[Message]) -> None:
+        del what
+        if path.is_dir():
+            shutil.copytree(path, target, copy_function=shutil.copyfile)
+        else:
+            shutil.copyfile(path, target)
+
+    return write
+
+
+def _real(path: Path, container: Container, encoding: Encoding = "cdr", **about: Any) -> Format:  # noqa: ANN401
+    """Return a recording that is there as a format of its own."""
+    truth = path.with_name(f"{path.stem}.truth.json")
+    name = "run" if path.is_dir() else f"run{path.suffix}"
+    return Format(_copied(path), name, container, encoding, is_folder=path.is_dir(), real=Real(path, truth), **about)
+
+
+_REAL: Mapping[str, Format] = {
+    "sample_mcap": _real(ROOT / "samples" / "two_robots.mcap", "mcap", compression="zstd", **_CHECKED),
+    "sample_bag": _real(ROOT / "samples" / "three_robots.bag", "bag", "ros1", compression="lz4"),
+    "real_mcap": _real(data_folder() / "intel_res.mcap", "mcap"),
+    "real_bag": _real(data_folder() / "intel_three.bag", "bag", "ros1"),
+    "real_db3": _real(data_folder() / "fr101_two", "db3"),
+}
+FORMATS: Mapping[str, Format] = {
+    **_WORLD,
+    **{name: each for name, each in _REAL.items() if each.real is not None and each.real.path.exists()},
+}
+"""Those of the small world, and recordings that are there already."""

@@ -9,16 +9,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.faults.world import FLOOR_FROM_MAP, PARTS_M, RESOLUTION_M, STRANGER, robot_map
+from benchmarks.faults.pieces import alike, shifts
+from benchmarks.faults.world import (
+    FLOOR_FROM_MAP,
+    ODD_BUILDINGS,
+    PARTS_M,
+    RESOLUTION_M,
+    STRANGER,
+    drawn_map,
+    robot_map,
+)
 from mapmerge.grid import Grid
 from mapmerge.sim2 import Sim2, wrap_angle
 from replay.events import Merged
 
 MOST_M, MOST_DEG = 0.30, 3.0
-"""Two cells: what may come of a map of which a part is damaged."""
+"""Two cells."""
+MOST_OF_DAMAGED_M = 0.60
+"""Of a map of which a part lies elsewhere than the rest: what fits both best may lie between them."""
+_WHOLE = 0.99
 _LEAST_ALIKE = 0.8
-_LEAST_ALIKE_IN_PIECE, _LEAST_PIECE = 0.95, 0.25
-_SHIFTS = 8
 
 
 def misplaced(event: Merged, latest: Mapping[str, Grid]) -> list[str]:
@@ -49,10 +59,11 @@ def error_of(reference: str, target: Grid, robot: str, source: Grid, target_from
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
-    """Whose map a grid shows, or a piece of it, and by how many columns and rows it is shifted."""
+    """Whose map a grid shows, or a piece of it, by how many columns and rows it is shifted, and whether that is all."""
 
     robot: str
     shift: tuple[int, int] = (0, 0)
+    is_whole: bool = False
 
 
 def _error(true_target: _Shown, target: Grid, true_source: _Shown, source: Grid, target_from_source: Sim2) -> str:
@@ -68,7 +79,8 @@ def _error(true_target: _Shown, target: Grid, true_source: _Shown, source: Grid,
     off_m = float(np.hypot(*(found_m[0] / target.resolution_m - true_cell))) * RESOLUTION_M
     yaw_rad = target_from_source.yaw_rad + source.map_from_grid.yaw_rad - target.map_from_grid.yaw_rad
     off_deg = abs(math.degrees(wrap_angle(yaw_rad - true.yaw_rad)))
-    return "" if off_m <= MOST_M and off_deg <= MOST_DEG else f"{off_m:.2f} m and {off_deg:.1f}° from where it lies"
+    most_m = MOST_M if true_target.is_whole and true_source.is_whole else MOST_OF_DAMAGED_M
+    return "" if off_m <= most_m and off_deg <= MOST_DEG else f"{off_m:.2f} m and {off_deg:.1f}° from where it lies"
 
 
 def _shown(grid: Grid, name: str) -> list[_Shown]:
@@ -77,17 +89,18 @@ def _shown(grid: Grid, name: str) -> list[_Shown]:
     Damage can move bytes, and so shift some of the cells of a map, or put cells of another robot's map there.
     Such a grid shows several things, and lies where any of them does.
     """
-    alike = {robot: _alike(grid, robot) for robot in FLOOR_FROM_MAP}
-    best = max(alike, key=lambda robot: alike[robot])
-    if alike[best] >= _LEAST_ALIKE:
-        return [_Shown(best)]
+    same = {robot: _alike(grid, robot) for robot in FLOOR_FROM_MAP}
+    best = max(same, key=lambda robot: same[robot])
+    if same[best] >= _LEAST_ALIKE:
+        return [_Shown(best, is_whole=same[best] >= _WHOLE)]
     known = name if name in FLOOR_FROM_MAP else best
     return [each for robot in FLOOR_FROM_MAP for each in _pieces(grid, robot)] or [_Shown(known)]
 
 
 def _alike(grid: Grid, robot: str) -> float:
     """Return the largest share of cells that are the same in one of a robot's maps, of those known in either."""
-    return max((_same(grid.cells, cells) for cells in _all_cells(robot) if cells.shape == grid.cells.shape), default=0)
+    odd = [] if robot == STRANGER else _odd_cells(robot)
+    return max(alike(grid.cells, cells) for cells in (*_all_cells(robot), *odd))
 
 
 @functools.cache
@@ -95,59 +108,13 @@ def _all_cells(robot: str) -> list[np.ndarray]:
     return [robot_map(robot, part).cells for part in range(len(PARTS_M))]
 
 
-def _same(cells: np.ndarray, others: np.ndarray) -> float:
-    known = (cells >= 0) | (others >= 0)
-    return float(np.mean(cells[known] == others[known])) if known.any() else 0.0
+@functools.cache
+def _odd_cells(robot: str) -> list[np.ndarray]:
+    return [drawn_map(robot, len(PARTS_M) - 1, walls).cells for walls in ODD_BUILDINGS]
 
 
 def _pieces(grid: Grid, robot: str) -> Iterator[_Shown]:
-    """Yield by how much pieces of a robot's map are shifted that a grid shows from one byte to another."""
-    flat = grid.cells.reshape(-1)
+    """Yield what a grid shows of a robot's maps that is shifted."""
     for cells in _all_cells(robot):
-        if cells.shape != grid.cells.shape or not (flat >= 0).any():
-            continue
-        for by in _likely_shifts(flat, cells.reshape(-1)):
-            moved = _moved(cells.reshape(-1), by)
-            if _piece(flat, moved) >= _LEAST_PIECE:
-                rows = round(by / grid.cols)
-                yield _Shown(robot, (by - rows * grid.cols, rows))
-
-
-def _piece(flat: np.ndarray, other: np.ndarray) -> float:
-    """Return which share of the known cells is in the longest stretch in which both are nearly the same."""
-    known = (flat >= 0) | (other >= 0)
-    # The stretch with the largest sum is one in which at least the wanted share agrees.
-    against = _LEAST_ALIKE_IN_PIECE / (1 - _LEAST_ALIKE_IN_PIECE)
-    sums = np.concatenate([[0.0], np.cumsum(np.where(flat == other, 1.0, -against) * known)])
-    gains = sums - np.minimum.accumulate(sums)
-    end = int(np.argmax(gains))
-    begin = int(np.argmin(sums[: end + 1]))
-    return float(np.sum(flat[begin:end] >= 0) / np.sum(flat >= 0))
-
-
-def _moved(flat: np.ndarray, by: int) -> np.ndarray:
-    """Return cells moved along the bytes, with unknown ones where there are none."""
-    moved = np.full_like(flat, -1)
-    if by >= 0:
-        moved[by:] = flat[: len(flat) - by]
-    else:
-        moved[:by] = flat[-by:]
-    return moved
-
-
-def _likely_shifts(flat: np.ndarray, other: np.ndarray) -> list[int]:
-    """Return the shifts at which most known cells, or most walls, are the same, and none.
-
-    Walls are narrow: of a piece of a map they tell by how much it is shifted, where free space says little.
-    """
-    walls = _correlated(flat == 100, other == 100)
-    known = walls + _correlated(flat == 0, other == 0)
-    best = (int(by) for same in (walls, known) for by in np.argsort(same, kind="stable")[-_SHIFTS:])
-    return sorted({0, *(by - len(walls) if by >= len(flat) else by for by in best)})
-
-
-def _correlated(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return for each shift how often both are so; shifts to the left are at the end."""
-    size = 2 * len(one)
-    spectrum = np.fft.rfft(one, size) * np.conj(np.fft.rfft(other, size))
-    return np.round(np.fft.irfft(spectrum, size))
+        for shift in shifts(grid.cells, cells):
+            yield _Shown(robot, shift)

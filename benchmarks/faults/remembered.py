@@ -17,8 +17,34 @@ from mapmerge.merger import Merger, MergeResult
 from mapmerge.outcome import Pair
 from mapmerge.prior import Prior
 
-_MOST = 3000
-_known: OrderedDict[bytes, MergeResult] = OrderedDict()
+_MOST_BYTES = 300 << 20
+# of placements, reasons and the like
+_OTHER_BYTES = 20_000
+
+
+class Known:
+    """Results by the steps that lead to them; those asked for longest ago are forgotten when they become too many."""
+
+    def __init__(self) -> None:
+        self._results: OrderedDict[bytes, MergeResult] = OrderedDict()
+        self._held_bytes = 0
+
+    def find(self, key: bytes) -> MergeResult | None:
+        """Return what is known; None if nothing is."""
+        if key in self._results:
+            self._results.move_to_end(key)
+        return self._results.get(key)
+
+    def keep(self, key: bytes, result: MergeResult) -> None:
+        """Take in a result that is not known."""
+        self._results[key] = result
+        self._held_bytes += _held_bytes(result)
+        while self._held_bytes > _MOST_BYTES:
+            _, forgotten = self._results.popitem(last=False)
+            self._held_bytes -= _held_bytes(forgotten)
+
+
+_known = Known()
 
 
 class RememberingMerger:
@@ -51,13 +77,11 @@ class RememberingMerger:
         self._steps.append((grids, dict(priors or {}), is_last))
         self._key.update(_text(grids, priors or {}, is_last=is_last))
         key = self._key.digest()
-        if key not in _known:
+        self._result = _known.find(key)
+        if self._result is None:
             self._computed()
-            _known[key] = self._last
-            while len(_known) > _MOST:
-                _known.popitem(last=False)
-        _known.move_to_end(key)
-        self._result = _known[key]
+            self._result = self._last
+            _known.keep(key, self._result)
         return self._result
 
     def _computed(self) -> Merger:
@@ -69,6 +93,11 @@ class RememberingMerger:
         for grids, priors, is_last in steps:
             self._last = self._merger.step(grids, priors, is_last=is_last)
         return self._merger
+
+
+def _held_bytes(result: MergeResult) -> int:
+    grids = (*result.grids.values(), *((result.merged,) if result.merged else ()))
+    return sum(int(grid.cells.nbytes) for grid in grids) + _OTHER_BYTES
 
 
 def _text(grids: Mapping[str, Grid], priors: Mapping[str, Prior], *, is_last: bool) -> bytes:

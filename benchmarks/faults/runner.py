@@ -7,7 +7,7 @@ import hashlib
 import io
 import json
 import traceback
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,6 +17,7 @@ from unittest.mock import patch
 from benchmarks.faults.placement import misplaced
 from benchmarks.faults.remembered import RememberingMerger
 from mapmerge.config import MergeConfig
+from mapmerge.grid import Grid
 from replay import pipeline
 from replay.arrivals import Feed
 from replay.errors import ReplayError, UsageError
@@ -102,11 +103,22 @@ class Ran:
     program: str = ""
 
 
-def run(path: Path, *, program: bool = False, max_memory_bytes: int | None = None) -> Ran:
-    """Replay a recording; with ``program`` also by the command line."""
+Misplaced = Callable[[Merged, Mapping[str, Grid]], list[str]]
+
+
+def run(
+    path: Path, *, program: bool = False, max_memory_bytes: int | None = None, misplaced: Misplaced = misplaced
+) -> Ran:
+    """Replay a recording; with ``program`` also by the command line.
+
+    Parameters
+    ----------
+    misplaced
+        Tells of an event which maps are placed where they do not lie.
+    """
     options = RunOptions((RunPath(None, path),), images="none", max_memory_bytes=max_memory_bytes)
     try:
-        ran = _replayed(options)
+        ran = _replayed(options, misplaced)
     except ReplayError as error:
         ran = Ran(error=str(error), is_usage=isinstance(error, UsageError))
     except Exception:  # noqa: BLE001 - whatever else comes is what is looked for
@@ -114,7 +126,7 @@ def run(path: Path, *, program: bool = False, max_memory_bytes: int | None = Non
     return replace(ran, program=_by_command_line(options, ran)) if program and not ran.crash else ran
 
 
-def _replayed(options: RunOptions) -> Ran:
+def _replayed(options: RunOptions, misplaced: Misplaced) -> Ran:
     seen: list[RawMessage] = []
     named: list[Named] = []
     wrong: dict[str, None] = {}

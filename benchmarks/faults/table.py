@@ -144,7 +144,7 @@ def _messages(
         recorded = tuple(change(messages(), rng))
         return Variant(FORMATS[name].recorded(recorded), recorded, max_memory_bytes)
 
-    return Fault(varied, lambda _: True, {})
+    return Fault(varied, lambda kind: kind.real is None, {})
 
 
 FAULTS: Mapping[str, Fault] = {

@@ -208,7 +208,7 @@ def _recording(folder: Path) -> Path:
     """Return the copy of the sample, made with the folder of the outputs if it is not there."""
     recording = folder / "in" / "run.mcap"
     if not recording.exists():
-        recording.parent.mkdir()
+        recording.parent.mkdir(parents=True)
         (folder / "out").mkdir()
         shutil.copyfile(SAMPLE, recording)
     return recording

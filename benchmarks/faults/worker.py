@@ -11,6 +11,7 @@ import pickle
 import resource
 import sys
 import warnings
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,10 +20,11 @@ from typing import BinaryIO
 from benchmarks.faults.cases import Case, Task
 from benchmarks.faults.formats import FORMATS, undamaged
 from benchmarks.faults.oracle import Expected, Judged, judge
-from benchmarks.faults.runner import Ran, Used, run
+from benchmarks.faults.placement import misplaced
+from benchmarks.faults.runner import Misplaced, Ran, Used, run
 from benchmarks.faults.table import FAULTS, Variant
 from benchmarks.faults.world import FLOOR_FROM_MAP, messages
-from replay.sources.base import GRID_TYPE, UPDATE_TYPE
+from replay.sources.base import GRID_TYPE, UPDATE_TYPE, RawMessage
 
 MEMORY_BYTES = 3 << 30
 FILE_BYTES = 1 << 30
@@ -72,15 +74,15 @@ def expected_of(case: Case, variant: Variant) -> Expected:
     kind, fault = FORMATS[case.format], FAULTS[case.fault]
     is_told = variant.told is not None
     recorded = messages() if variant.told is None else variant.told
-    maps = [raw for raw in kind.raw(recorded) if raw.msgtype in {GRID_TYPE, UPDATE_TYPE}]
+    maps, topics = _told_messages(case.format) if variant.told is None else _messages(kind.raw(recorded))
     return Expected(
-        frozenset(map(Used.of, maps)),
+        maps,
         undamaged_run(case.format).merged if variant.told is None else None,
         variant.recording.main,
         tuple(FLOOR_FROM_MAP),
         is_checked=(kind.is_checked or is_told) and not fault.is_rewritten,
         are_names_checked=(kind.are_names_checked or is_told) and not fault.is_rewritten,
-        topics=frozenset((each.topic, each.msgtype) for each in recorded),
+        topics=topics,
         leaves_no_trace=case.format in fault.silent_in,
     )
 
@@ -89,16 +91,38 @@ def expected_of(case: Case, variant: Variant) -> Expected:
 def undamaged_run(name: str) -> Ran:
     """Return what comes of the undamaged recording in a format."""
     with TemporaryDirectory(prefix="faults-") as folder:
-        ran = run(undamaged(name).write(Path(folder)))
+        ran = run(undamaged(name).write(Path(folder)), misplaced=_misplaced(name))
     if ran.error or ran.crash or ran.named or ran.misplaced or not {"r1", "r2"} < set(ran.merged):
         raise AssertionError(f"the undamaged recording in {name} is not merged as it should be: {ran}")
     return ran
 
 
+def _misplaced(name: str) -> Misplaced:
+    """Return what tells where maps of a format lie."""
+    real = FORMATS[name].real
+    return misplaced if real is None else real.misplaced
+
+
+@cache
+def _told_messages(name: str) -> tuple[frozenset[Used], frozenset[tuple[str, str]]]:
+    return _messages(FORMATS[name].raw(messages()))
+
+
+def _messages(found: Sequence[RawMessage]) -> tuple[frozenset[Used], frozenset[tuple[str, str]]]:
+    """Return the maps among messages, and all their topics."""
+    maps = frozenset(Used.of(raw) for raw in found if raw.msgtype in {GRID_TYPE, UPDATE_TYPE})
+    return maps, frozenset((raw.topic, raw.msgtype) for raw in found)
+
+
 def _run_in(folder: Path, variant: Variant, task: Task) -> Judged:
     path = variant.recording.write(folder)
     before = {each: each.read_bytes() for each in _files(path)}
-    ran = run(path, program=task.program, max_memory_bytes=variant.max_memory_bytes)
+    ran = run(
+        path,
+        program=task.program,
+        max_memory_bytes=variant.max_memory_bytes,
+        misplaced=_misplaced(task.case.format),
+    )
     judged = judge(ran, expected_of(task.case, variant))
     if before != {each: each.read_bytes() for each in _files(path)}:
         raise AssertionError("the recording was changed")
@@ -116,8 +140,9 @@ def _warm_up() -> None:
 
     warnings.simplefilter("ignore")
     cv2.setNumThreads(1)
-    for name in FORMATS:
-        undamaged_run(name)
+    for name, kind in FORMATS.items():
+        if kind.real is None:
+            undamaged_run(name)
 
 
 if __name__ == "__main__":

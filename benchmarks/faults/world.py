@@ -53,6 +53,9 @@ SQUARE_ROOM: tuple[Box, ...] = (
     (1.35, 0.0, 1.5, 6.0),
     (7.5, 0.0, 7.65, 6.0),
 )
+ONE_WALL: tuple[Box, ...] = ((-0.15, 3.0, 9.15, 3.15),)
+CORRIDOR: tuple[Box, ...] = ((-0.15, 2.1, 9.15, 2.25), (-0.15, 3.9, 9.15, 4.05))
+ODD_BUILDINGS = (BARE_ROOM, SQUARE_ROOM, ONE_WALL, CORRIDOR)
 FLOOR_FROM_MAP: Mapping[str, Sim2] = {
     "r1": Sim2(-1.0, -1.0),
     "r2": Sim2(10.2, 1.3, 2.2),

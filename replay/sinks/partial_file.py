@@ -82,13 +82,21 @@ class PartialFile:
             if self._descriptor is not None:
                 _sync(self._descriptor)
 
+    def check(self) -> None:
+        """See that the file is still there.
+
+        Raises
+        ------
+        FileNotFoundError
+            If somebody has removed or replaced it.
+        """
+        if not self._is_ours():
+            raise FileNotFoundError(errno.ENOENT, f"{self.partial.name} was removed or replaced while it was written")
+
     def publish(self) -> None:
         """Give the file its final name, replacing what has it."""
         with output_errors(self.path):
-            if not self._is_ours():
-                raise FileNotFoundError(
-                    errno.ENOENT, f"{self.partial.name} was removed or replaced while it was written"
-                )
+            self.check()
             if _CLOSED_FIRST:
                 self._close()
             self.partial.replace(self.path)

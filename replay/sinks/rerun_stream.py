@@ -134,6 +134,7 @@ class RrdStream:
         self.flush()
         self.close()
         self._outlet.check()
+        self._file.check()
         try:
             # The library tells nobody when it fails to write the end of the file; without that this raises.
             RrdReader(self._file.partial).store()

@@ -1,29 +1,43 @@
 """What becomes of damaged recordings, and whether a wrong outcome would be noticed."""
 
+import bz2
 import sys
-from collections import OrderedDict
 from dataclasses import replace
+from random import Random
 
+import lz4.frame
 import numpy as np
 import pytest
 
 from benchmarks.faults import __main__ as command
-from benchmarks.faults import placement, remembered, whole_runs, worker
+from benchmarks.faults import bombs, placement, remembered, whole_runs, worker
 from benchmarks.faults.cases import Case, Task, cases
 from benchmarks.faults.formats import FORMATS, undamaged
 from benchmarks.faults.mcap_layout import closed, parsed
+from benchmarks.faults.messages import MapContent
 from benchmarks.faults.oracle import FAILURES, Expected, Judged, Verdict, judge
 from benchmarks.faults.pool import Worker, run_all
 from benchmarks.faults.printed import Counts
 from benchmarks.faults.runner import Named, Ran, Used
 from benchmarks.faults.table import FAULTS
-from benchmarks.faults.world import FLOOR_FROM_MAP, changed, messages, robot_map
+from benchmarks.faults.world import (
+    BARE_ROOM,
+    FLOOR_FROM_MAP,
+    SQUARE_ROOM,
+    changed,
+    drawn_map,
+    messages,
+    robot_map,
+    robot_of,
+)
 from mapmerge.grid import Grid
 from mapmerge.merger import Merger
 from mapmerge.sim2 import Sim2
+from replay.codec import decode
 from replay.sources import open_source
-from replay.sources.base import RawMessage
+from replay.sources.base import GRID_TYPE, RawMessage
 from replay.sources.mcap_file import McapFile
+from replay.sources.zstd import zstd
 
 SEED = 7
 # Variants that once ended wrongly, by seed.
@@ -45,6 +59,7 @@ FOUND = [
     (5, "mcap_no_crc/block_removed/0"),
     (5, "bag_lz4_unchecked/block_removed/2"),
     (6, "mcap_folder/blocks_swapped/1"),
+    (8, "mcap_no_crc/block_removed/0"),
     (3, "mcap_folder/truncated/0"),
     (3, "db3_folder/db3_row_time_wrong/0"),
     (3, "db3_split/db3_pages_swapped/1"),
@@ -55,6 +70,13 @@ ONE, TWO, OTHER = Used("/r1/map", 1, "aa"), Used("/r2/map", 2, "bb"), Used("/r2/
 EXPECTED = Expected(frozenset({ONE, TWO}), ("r1", "r2", "dd"), "run.mcap", ("r1", "r2"), is_checked=True)
 RIGHT = Ran(used=(ONE, TWO), merged=("r1", "r2", "dd"))
 LOST = Ran(used=(ONE,), merged=("r1",))
+
+
+@pytest.fixture(autouse=True)
+def small_bombs(monkeypatch):
+    """Those that are tried take seconds to be made."""
+    monkeypatch.setattr(bombs, "SIZES", (1 << 24,))
+    monkeypatch.setattr(bombs, "_FILE_BYTES", 1 << 24)
 
 
 def said(messages=1):
@@ -179,7 +201,7 @@ class TestFakeFailures:
             return replace(result, robots=robots)
 
         monkeypatch.setattr(Merger, "step", shifted)
-        monkeypatch.setattr(remembered, "_known", OrderedDict())
+        monkeypatch.setattr(remembered, "_known", remembered.Known())
         judged = run_one()
         assert judged.verdict is Verdict.WRONG
         assert "r2 is placed 0.5" in judged.why
@@ -217,6 +239,7 @@ class TestPlacement:
         true = FLOOR_FROM_MAP["r1"].inverse() @ FLOOR_FROM_MAP["r2"] @ moved.map_from_grid.inverse()
         target = robot_map("r1", 2)
         assert placement.error_of("r1", target, "r3", moved, true) == ""
+        assert placement.error_of("r1", target, "r3", moved, true @ Sim2(0.32))
         assert "m and" in placement.error_of("r1", target, "r3", moved, true @ Sim2(0.4))
         assert "°" in placement.error_of("r1", target, "r2", moved, true @ Sim2(yaw_rad=0.1))
         assert "of r3" in placement.error_of("r1", target, "r2", robot_map("r3", 2), true)
@@ -237,6 +260,7 @@ class TestPlacement:
         target, source = robot_map("r1", 2), Grid(cells, 0.15)
         assert placement.error_of("r1", target, "r2", source, true) == ""
         assert placement.error_of("r1", target, "r2", source, true @ Sim2(12 * 0.15)) == ""
+        assert placement.error_of("r1", target, "r2", source, true @ Sim2(-6 * 0.15))
         assert placement.error_of("r1", target, "r2", source, true @ Sim2(6 * 0.15))
         assert placement.error_of("r1", target, "r2", source, true @ Sim2(yaw_rad=1.0))
 
@@ -244,6 +268,43 @@ class TestPlacement:
         wide = Grid(robot_map("r2", 2).cells, 0.2)
         true = FLOOR_FROM_MAP["r1"].inverse() @ FLOOR_FROM_MAP["r2"]
         assert placement.error_of("r1", robot_map("r1", 2), "r2", wide, true)
+
+
+class TestReal:
+    """Recordings of which a file beside says where maps lie."""
+
+    ERROR = staticmethod(FORMATS["sample_mcap"].real.error_of)
+
+    @pytest.fixture
+    def last(self):
+        """The last map of each robot."""
+        found = {}
+        for raw in FORMATS["sample_mcap"].raw(()):
+            if raw.msgtype == GRID_TYPE:
+                found[raw.topic.split("/")[1]] = decode(raw).grid
+        return found
+
+    def test_a_map_lies_where_the_file_says(self, last):
+        true = Sim2(28.162, 0.906, 2.18)
+        target, source = ("r1", last["r1"]), ("r2", last["r2"])
+        assert self.ERROR(target, source, true) == ""
+        assert self.ERROR(source, target, true.inverse()) == ""
+        assert "m and" in self.ERROR(target, source, Sim2(0.8) @ true)
+        assert self.ERROR(target, source, true.inverse())
+
+    def test_it_is_known_by_its_cells_whatever_its_name_corner_and_shift(self, last):
+        true = Sim2(28.162, 0.906, 2.18)
+        cells, cell_m = last["r2"].cells, last["r2"].resolution_m
+        moved = Grid(np.roll(cells.reshape(-1), 40).reshape(cells.shape), cell_m, last["r2"].map_from_grid)
+        corner = Grid(cells, cell_m, Sim2(3.0, 4.0, 0.5))
+        target = ("r1", last["r1"])
+        assert self.ERROR(target, ("r7", last["r2"]), true) == ""
+        assert self.ERROR(target, ("r2", corner), true) != ""
+        assert (
+            self.ERROR(target, ("r2", corner), true @ last["r2"].map_from_grid @ corner.map_from_grid.inverse()) == ""
+        )
+        assert self.ERROR(target, ("r2", moved), true @ Sim2(-40 * cell_m)) == ""
+        assert self.ERROR(target, ("r2", moved), true) != ""
 
 
 class TestFormats:
@@ -277,6 +338,103 @@ class TestCases:
     def test_a_name_that_is_none(self, name):
         with pytest.raises(ValueError, match="is no case"):
             Case.named(name, SEED)
+
+
+class TestBombs:
+    @pytest.mark.parametrize(
+        ("zeros", "decompress"),
+        [
+            (bombs.zeros_zstd, zstd.decompress),
+            (bombs.zeros_lz4, lz4.frame.decompress),
+            (bombs.zeros_bz2, bz2.decompress),
+        ],
+    )
+    def test_are_small_and_grow(self, zeros, decompress):
+        size = 1 << 24
+        assert decompress(zeros(size)) == bytes(size)
+        assert len(zeros(size)) < size // 100
+
+    @pytest.mark.parametrize("kind", [name for name, each in FORMATS.items() if each.compression and not each.real])
+    def test_take_the_place_of_something_in_every_format_that_is_compressed(self, kind):
+        judged = worker.answer(Task(Case(kind, "bomb", 0, SEED)))
+        assert judged.verdict in {Verdict.RIGHT, Verdict.NAMED, Verdict.ERROR}, judged.why
+        assert Case(kind, "bomb", 0, SEED).variant().recording != undamaged(kind)
+
+
+class TestOddMaps:
+    TRUE = FLOOR_FROM_MAP["r1"].inverse() @ FLOOR_FROM_MAP["r2"]
+
+    def maps(self, name, number=0):
+        told = Case("mcap_none", name, number, SEED).variant().told
+        return {
+            robot_of(each.topic): Grid(
+                np.frombuffer(each.content.cells, np.int8).reshape(each.content.height, each.content.width), 0.15
+            )
+            for each in told
+            if isinstance(each.content, MapContent)
+        }
+
+    def test_symmetric_rooms_look_the_same_turned_by_half_and_lie_at_one_place(self):
+        for walls in (BARE_ROOM, SQUARE_ROOM):
+            room = drawn_map("r1", 2, walls).cells
+            rows, cols = np.nonzero(room >= 0)
+            inside = room[rows.min() : rows.max() + 1, cols.min() : cols.max() + 1]
+            turned = inside[::-1, ::-1]
+            assert np.mean((inside == 0) == (turned == 0)) > 0.9
+            target, source = Grid(room, 0.15), drawn_map("r2", 2, walls)
+            assert placement.error_of("r1", target, "r2", source, self.TRUE) == ""
+            centre = Sim2(4.5, 3.0)
+            about = FLOOR_FROM_MAP["r1"].inverse() @ centre @ Sim2(yaw_rad=np.pi) @ centre.inverse()
+            assert placement.error_of("r1", target, "r2", source, about @ FLOOR_FROM_MAP["r2"])
+
+    def test_identical_maps_lie_on_each_other(self):
+        one = robot_map("r1", 2)
+        assert placement.error_of("r1", one, "r2", one, Sim2()) == ""
+        found = self.maps("maps_identical")
+        same = [(a, b) for a in found for b in found if a < b and np.array_equal(found[a].cells, found[b].cells)]
+        assert len(same) == 1
+
+    def test_a_mirrored_map_lies_nowhere_else(self):
+        mirrored = Grid(robot_map("r2", 2).cells[::-1], 0.15)
+        assert placement.error_of("r1", robot_map("r1", 2), "r2", mirrored, Sim2(3.0, 1.0, 0.5))
+        changed_ones = [
+            robot
+            for robot, grid in self.maps("maps_mirrored").items()
+            if np.array_equal(grid.cells[::-1], robot_map(robot, 2).cells)
+        ]
+        assert len(changed_ones) == 1
+
+    def test_a_map_over_the_memory_is_named(self):
+        judged = worker.answer(Task(Case("mcap_zstd", "message_over_memory", 0, SEED), program=True))
+        assert judged.verdict is Verdict.NAMED
+        assert "over_memory" in judged.why
+
+
+class TestWholeRuns:
+    @pytest.mark.parametrize("name", ["run_interrupted", "run_on_small_disk", "run_on_read_only_disk"])
+    def test_end_in_one_line(self, name, tmp_path):
+        judged = whole_runs.MISFORTUNES[name](Random(3), tmp_path)  # noqa: S311
+        if judged is None:
+            pytest.skip("nobody may have a disk of their own here")
+        assert judged.verdict in {Verdict.ERROR, Verdict.RIGHT}, judged.why
+
+    def test_none_writes_over_its_input(self, tmp_path):
+        for seed in range(4):
+            judged = whole_runs.into_its_input(Random(seed), tmp_path / str(seed))  # noqa: S311
+            assert judged.verdict is Verdict.ERROR
+            assert "is an input" in judged.why
+
+    def test_are_tried_as_often_as_is_said(self, monkeypatch):
+        def never(*_):
+            return None
+
+        def always(*_):
+            return Judged(Verdict.RIGHT)
+
+        monkeypatch.setattr(whole_runs, "MISFORTUNES", {"one": never, "other": always})
+        monkeypatch.setattr(whole_runs, "killed_runs", lambda *_: [])
+        assert [name for name, _ in whole_runs.tried(3, SEED)] == ["other"] * 3
+        assert list(whole_runs.tried(0, SEED)) == []
 
 
 def cases_of(count):
@@ -384,7 +542,7 @@ def test_equal_steps_are_merged_once(monkeypatch):
     merges = []
     step = Merger.step
     monkeypatch.setattr(Merger, "step", lambda *given, **named: merges.append(1) or step(*given, **named))
-    monkeypatch.setattr(remembered, "_known", OrderedDict())
+    monkeypatch.setattr(remembered, "_known", remembered.Known())
     for _ in range(2):
         worker.undamaged_run.cache_clear()
         worker.undamaged_run("mcap_none")
@@ -392,8 +550,6 @@ def test_equal_steps_are_merged_once(monkeypatch):
 
 
 def test_messages_are_laid_out_as_the_library_does():
-    from replay.codec import decode
-
     for each in messages():
         if each.topic != "/chatter":
             one, other = (

@@ -139,19 +139,21 @@ class TestErrors:
             sink.discard()
             raise
 
-    def refused(self, path: Path, open_sink: Opens, damage: Callable[[], object] = lambda: None) -> None:
+    def refused(self, path: Path, open_sink: Opens, damage: Callable[[], object] = lambda: None) -> str:
         with pytest.raises(OutputError) as caught:
             self.run(open_sink, damage)
         assert str(path) in str(caught.value)
         assert "\n" not in str(caught.value)
         assert not path.is_file()
+        return str(caught.value)
 
     def test_no_folder(self, open_sink: Opens, path: Path) -> None:
         path.parent.rmdir()
         self.refused(path, open_sink)
 
     def test_the_folder_vanishes(self, open_sink: Opens, path: Path) -> None:
-        self.refused(path, open_sink, lambda: shutil.rmtree(path.parent))
+        said = self.refused(path, open_sink, lambda: shutil.rmtree(path.parent))
+        assert "was removed or replaced while it was written" in said
         assert not path.parent.exists()
 
     def test_a_file_where_the_folder_should_be(self, open_sink: Opens, path: Path) -> None:
