@@ -346,7 +346,7 @@ def test_more_parts_than_files_may_be_open(
     tmp_path: Path, storage: Literal["sqlite3", "mcap"], compression: Literal["none", "file"]
 ) -> None:
     pytest.importorskip("resource", reason="Windows has no such limit")
-    # what is open at a time must not grow with the parts: 60, of which no two are there to be read at once
+    # more than may be open: what is open must not grow with the parts
     messages = [bags.recorded_map("/r1/map", START + each, seed=1, rows=1) for each in range(60)]
     path = bags.write_split_rosbag2(tmp_path / "bag", messages, storage, compression)
     command = [sys.executable, "-c", READ_WITH_FEW_HANDLES, str(path)]
