@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from replay.skip_cause import SkipCause
 from replay.words import counted
@@ -34,6 +35,13 @@ class Loss:
     topic: str = ""
 
 
+MOST_PLACES = 20
+"""Of one cause and topic, so many places are listed; a recording may be damaged at each of its messages."""
+
+OTHER_PLACES = "other places"
+"""What stands for the places that are not listed."""
+
+
 class Losses:
     """The losses of one recording, each once, in the order in which they were met.
 
@@ -42,14 +50,28 @@ class Losses:
     """
 
     def __init__(self) -> None:
-        self._known: dict[Loss, None] = {}
+        # their hashes alone, because there may be one for each message
+        self._met: set[int] = set()
+        self._listed: list[Loss] = []
+        self._places: Counter[tuple[SkipCause, str]] = Counter()
+        self._others: dict[tuple[SkipCause, str], Loss] = {}
         self._new: list[Loss] = []
 
     def add(self, loss: Loss) -> None:
         """Take in a loss, unless it is known."""
-        if loss not in self._known:
-            self._known[loss] = None
-            self._new.append(loss)
+        if hash(loss) in self._met:
+            return
+        self._met.add(hash(loss))
+        self._new.append(loss)
+        kind = loss.cause, loss.topic
+        self._places[kind] += 1
+        if self._places[kind] <= MOST_PLACES:
+            self._listed.append(loss)
+            return
+        others = self._others.get(kind, replace(loss, place=OTHER_PLACES, messages=0))
+        is_known = others.messages is not None and loss.messages is not None
+        messages = (others.messages or 0) + (loss.messages or 0) if is_known else None
+        self._others[kind] = replace(others, messages=messages)
 
     def new(self) -> tuple[Loss, ...]:
         """Return the losses that were met since this was asked last."""
@@ -58,8 +80,8 @@ class Losses:
 
     @property
     def all(self) -> tuple[Loss, ...]:
-        """All that were met so far."""
-        return tuple(self._known)
+        """All that were met so far; of each cause and topic, those at other places than the first few as one."""
+        return (*self._listed, *self._others.values())
 
 
 def summed_up(losses: Iterable[tuple[str, Loss]]) -> str:

@@ -12,9 +12,10 @@ from replay.skip_cause import SkipCause
 from replay.sources.memory import MOST_BYTES, over_memory
 from replay.sources.rosbag1_records import CONNECTION, MESSAGE, Record, find_in, is_unfinished, record_in
 
-# So little is given to a decompressor at once that it returns at most some 20 MB.
+# What a decompressor is given and what it returns at once: a block of bz2 that takes 50 bytes may hold 46 MB.
 _BZ2_BYTES = 1 << 12
 _LZ4_BYTES = 1 << 16
+_STEP_BYTES = 1 << 18
 _MOST_HEADER_BYTES = 1 << 17
 _INNER = (MESSAGE, CONNECTION)
 
@@ -69,7 +70,10 @@ class _Decompressor(Protocol):
     @property
     def eof(self) -> bool: ...
 
-    def decompress(self, data: bytes, /) -> bytes: ...
+    @property
+    def needs_input(self) -> bool: ...
+
+    def decompress(self, data: bytes, max_length: int) -> bytes: ...
 
 
 def read_chunk(file: BinaryIO, place: ChunkPlace, most_bytes: int = MOST_BYTES) -> Chunk:
@@ -114,7 +118,10 @@ def _decompressed(file: BinaryIO, place: ChunkPlace, limit: int) -> tuple[bytes,
     for piece in _pieces(file, place, piece_bytes):
         before = output.tell()
         try:
-            output.write(decompressor.decompress(piece))
+            for step in _steps(decompressor, piece):
+                output.write(step)
+                if output.tell() > limit:
+                    break
         # OSError is bz2's, RuntimeError lz4's
         except (OSError, RuntimeError, ValueError) as error:
             # The end of a block, where its checksum is, may not have been reached in what came last.
@@ -124,6 +131,16 @@ def _decompressed(file: BinaryIO, place: ChunkPlace, limit: int) -> tuple[bytes,
         if decompressor.eof or output.tell() > limit:
             break
     return output.getvalue(), None, decompressor.eof
+
+
+def _steps(decompressor: _Decompressor, piece: bytes) -> Iterator[bytes]:
+    """Yield what a piece of the compressed data leads to, a little at a time."""
+    step = decompressor.decompress(piece, _STEP_BYTES)
+    yield step
+    # That of bz2 may hold more though it says that it needs input.
+    while not decompressor.eof and (len(step) == _STEP_BYTES or not decompressor.needs_input):
+        step = decompressor.decompress(b"", _STEP_BYTES)
+        yield step
 
 
 def _decompressor(compression: str) -> tuple[_Decompressor, int]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import sqlite3
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -21,8 +23,9 @@ from replay.init_pose import DEFAULT_SIGMA_M, DEFAULT_SIGMA_YAW_RAD, InitPose
 from replay.options import RunOptions
 from replay.pipeline import merge
 from replay.runs import RunPath
+from replay.sources.losses import MOST_PLACES, OTHER_PLACES
 from tests import bags
-from tests.bags import Recorded, write_mcap, write_rosbag1, write_rosbag2
+from tests.bags import Recorded, write_bare_db3, write_mcap, write_rosbag1, write_rosbag2
 from tests.outputs import reports
 from tests.program import Program
 from tests.runs import at, growing, in_log_order, is_right, link, linked, reference_from, seen, two_robots
@@ -278,6 +281,21 @@ class TestWhatIsSaid:
         assert strict.status == 2
         assert strict.err.splitlines()[-1].startswith("replay: error: run.mcap: /tf at 17000000")
         assert replay.merge(run, "--strict").status == 0
+
+    def test_transforms_that_are_all_damaged_are_added_up(self, replay: Program, tmp_path: Path) -> None:
+        moving = [linked(0.01 * number, link("r1/map", "r2/map", TRUE)) for number in range(100)]
+        run = write_bare_db3(tmp_path / "run.db3", in_log_order(moving, robots()))
+        with closing(sqlite3.connect(run)) as database:
+            cut = bytes.fromhex("28b52ffd00")
+            database.execute(
+                "UPDATE messages SET data = ? WHERE topic_id IN (SELECT id FROM topics WHERE name = '/tf')", [cut]
+            )
+            database.commit()
+        ran = replay.merge(run, "--use-tf")
+        assert ran.report["skipped"] == {"damaged": 100}
+        rows = [(each["topic"], each["messages"]) for each in ran.report["skipped_at"]]
+        assert rows == [*[("/tf", 1)] * MOST_PLACES, ("/tf", 100 - MOST_PLACES)]
+        assert ran.report["skipped_at"][-1]["place"] == OTHER_PLACES
 
 
 class TestContradicted:

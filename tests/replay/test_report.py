@@ -21,6 +21,7 @@ from replay.errors import BadMessage
 from replay.events import Noted, Report, RobotInput, Skipped
 from replay.report import ReportBuilder
 from replay.skip_cause import SkipCause
+from replay.sources.losses import MOST_PLACES, OTHER_PLACES
 from tests.runs import bare_room, begun_anew, flat_map, is_right, reference_from
 
 ROBOTS = ("r1", "r2", "r3")
@@ -155,6 +156,23 @@ def test_what_is_lost_is_counted_by_place() -> None:
         ("the chunk at byte 3", 3, "detail"),
         ("the chunk at byte None", None, "detail"),
         ("", 2, "no cell"),
+    ]
+
+
+def test_of_very_many_places_the_first_are_listed() -> None:
+    report = builder()
+    for number in range(500):
+        place = f"message {number}"
+        report.skip(Skipped("", "/tf", number, SkipCause.DAMAGED, f"detail {number}", "run.db3", place))
+    report.skip(Skipped("", "/tf", 0, SkipCause.DAMAGED, "detail 0", "other.db3", "message 0"))
+    found = report.build(None, Merger(ROBOTS).result, [INPUT])
+    validate(found)
+    assert found["skipped"] == {"damaged": 501}
+    listed = [(item["input"], item["place"], item["messages"], item["detail"]) for item in found["skipped_at"]]
+    assert listed == [
+        *(("run.db3", f"message {number}", 1, f"detail {number}") for number in range(MOST_PLACES)),
+        ("run.db3", OTHER_PLACES, 500 - MOST_PLACES, f"detail {MOST_PLACES}"),
+        ("other.db3", "message 0", 1, "detail 0"),
     ]
 
 
