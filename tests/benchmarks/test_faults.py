@@ -60,6 +60,8 @@ FOUND = [
     (5, "bag_lz4_unchecked/block_removed/2"),
     (6, "mcap_folder/blocks_swapped/1"),
     (8, "mcap_no_crc/block_removed/0"),
+    (11, "bag_lz4_unchecked/all_random/1"),
+    (11, "mcap_ros1/block_removed/1"),
     (3, "mcap_folder/truncated/0"),
     (3, "db3_folder/db3_row_time_wrong/0"),
     (3, "db3_split/db3_pages_swapped/1"),
