@@ -331,6 +331,8 @@ def _missing(counts: Mapping[int, int], contents: Contents) -> list[Loss]:
         short = count - contents.counts.get(key, 0)
         topic = contents.channels[key].topic if key in contents.channels else ""
         if short > 0:
-            detail = f"the summary counts {counted(count, 'message')}, and {count - short} are there"
+            # named, as two channels of which nothing else is known would be taken for one
+            whose = "" if topic else f" of channel {key}"
+            detail = f"the summary counts {counted(count, 'message')}{whose}, and {count - short} are there"
             losses.append(Loss(SkipCause.DAMAGED, "the data section", detail, short, topic))
     return losses

@@ -62,6 +62,7 @@ FOUND = [
     (8, "mcap_no_crc/block_removed/0"),
     (11, "bag_lz4_unchecked/all_random/1"),
     (11, "mcap_ros1/block_removed/1"),
+    (12, "mcap_split/mcap_record_removed/0"),
     (3, "mcap_folder/truncated/0"),
     (3, "db3_folder/db3_row_time_wrong/0"),
     (3, "db3_split/db3_pages_swapped/1"),
