@@ -33,7 +33,7 @@ from replay.sources.mcap_records import (
     RecordFile,
     message_header,
 )
-from replay.sources.mcap_walk import Gap, Walk
+from replay.sources.mcap_walk import Walk
 from replay.sources.memory import over_memory
 from replay.words import counted
 
@@ -222,7 +222,7 @@ class _Found:
             return unknown
         losses = [*self._losses]
         losses += [chunk_loss(start, error, lost, contents.channels) for start, error, lost in self._bad_chunks]
-        losses += [self._gap_loss(gap) for gap in walk.gaps]
+        losses += self._gap_losses(walk, contents, sum(each.messages or 0 for each in losses))
         if walk.ends_early is not None:
             losses.append(_ends_early(walk.ends_early, self._file))
         if not losses:
@@ -237,10 +237,26 @@ class _Found:
             said = statistics_between(self._file, walk.data_end.end, walk.footer.start)
         return said.channel_message_counts if said else {}
 
-    def _gap_loss(self, gap: Gap) -> Loss:
-        lost = indexed_counts(self._file, gap.stop)
-        what = f"what should be a record there, of type {gap.opcode}, is none that can be read"
-        return _damaged(gap.start, gap.stop, what, lost.total() if lost else None)
+    def _gap_losses(self, walk: Walk, contents: Contents, named: int) -> list[Loss]:
+        """Return what is lost in gaps, beside what was named.
+
+        The indexes that follow a gap are those of the last chunk in it, and there may have been others: what they count
+        is believed if what the summary counts says so, too.
+        """
+        counts = [indexed_counts(self._file, gap.stop) for gap in walk.gaps]
+        totals = [count.total() if count else None for count in counts]
+        said = self._said_counts(walk)
+        short = sum(max(0, count - contents.counts.get(key, 0)) for key, count in said.items())
+        is_all = bool(said) and short <= named + sum(total or 0 for total in totals)
+        return [
+            _damaged(
+                gap.start,
+                gap.stop,
+                f"what should be a record there, of type {gap.opcode}, is none that can be read",
+                total if is_all else None,
+            )
+            for gap, total in zip(walk.gaps, totals, strict=True)
+        ]
 
     def _after_the_end(self, walk: Walk) -> list[Loss]:
         """Return what is lost if files were put together end to end."""
@@ -316,6 +332,8 @@ def _missing(counts: Mapping[int, int], contents: Contents) -> list[Loss]:
         short = count - contents.counts.get(key, 0)
         topic = contents.channels[key].topic if key in contents.channels else ""
         if short > 0:
-            detail = f"the summary counts {counted(count, 'message')}, and {count - short} are there"
+            # named, as two channels of which nothing else is known would be taken for one
+            whose = "" if topic else f" of channel {key}"
+            detail = f"the summary counts {counted(count, 'message')}{whose}, and {count - short} are there"
             losses.append(Loss(SkipCause.DAMAGED, "the data section", detail, short, topic))
     return losses

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from replay.errors import InputError
+from replay.plain_text import brief
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE, RawMessage, SourceInfo
 from replay.sources.boundary import COMMON, TEXT_MODE, Closing, translated
@@ -249,7 +250,7 @@ def _is_followed(chunk: bytes, record: Record) -> bool:
 def _begin(path: Path, file: BagFile) -> tuple[BagFile, Record | None]:
     """Return the file with its index's place, and its header if that can be read; refuse other versions."""
     magic = file.file.readline(32)
-    version = magic.decode("ascii", "replace").strip()
+    version = brief(magic.decode("ascii", "replace").strip())
     if magic.startswith(_MAGIC_BEFORE_2_0):
         raise InputError(
             f"{path}: this bag has the format '{version}' of before 2010; version 2.0 is read: "

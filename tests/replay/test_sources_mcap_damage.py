@@ -466,6 +466,20 @@ def test_a_chunk_that_is_larger_than_is_read_is_named(tmp_path: Path, compressio
     assert (loss.cause, loss.place) == (cause, f"the chunk at byte {path.read_bytes().index(bomb)}")
 
 
+def test_bytes_that_are_missing_over_several_chunks(tmp_path: Path) -> None:
+    """Only the last chunk that they reach into is followed by its index: there is more missing than that counts."""
+    path = bags.write_mcap(tmp_path / "a.mcap", SMALL, chunk_bytes=400)
+    one, _, third, *rest = bags.chunks(path)
+    assert rest
+    data = path.read_bytes()
+    path.write_bytes(data[: one.start + one.size + 10] + data[third.start + third.size // 2 :])
+    found, losses, _ = _read(path)
+    missing = len(SMALL) - len(found)
+    assert missing > 1
+    named = [loss.messages for loss in losses]
+    assert None in named or sum(each or 0 for each in named) >= missing
+
+
 def test_a_message_that_is_larger_than_is_read_is_named(tmp_path: Path) -> None:
     path = _file(tmp_path / "a.mcap", _described() + _message(1, 5) + _message(1, 6, bytes(2000)) + _message(1, 7))
     with McapFile(path, most_bytes=1000) as source:

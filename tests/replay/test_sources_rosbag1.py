@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from rosbags.rosbag1 import Reader
 
+from replay.errors import InputError
 from replay.skip_cause import SkipCause
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE
@@ -406,6 +407,14 @@ def test_another_version(tmp_path: Path) -> None:
     path = tmp_path / "a.bag"
     path.write_bytes(b"#ROSBAG V3.7\n" + bytes(100))
     refused(path, "#ROSBAG V3.7")
+
+
+def test_a_version_that_is_no_text(tmp_path: Path) -> None:
+    (tmp_path / "a.bag").write_bytes(b"#ROSBAG V2L\x0cz\x07\x1e" + bytes(range(100)))
+    with pytest.raises(InputError) as refused, open_source(tmp_path / "a.bag"):
+        pass
+    assert str(refused.value).isprintable()
+    assert "version 2.0 is read" in str(refused.value)
 
 
 def test_bag_without_messages(tmp_path: Path) -> None:
