@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from replay.footprint import MemoryLimit
 from replay.init_pose import refuse_unfit
 from replay.options import NS_PER_S, RunOptions
 from replay.selection import Selected, select
-from replay.sources import open_source
+from replay.sources import open_sources
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
 from replay.transform_feeds import transform_feeds
 
@@ -122,10 +122,9 @@ def open_plan(options: RunOptions) -> Iterator[Plan]:
     ReplayError
         If an input cannot be read, or the robots that were asked for are not there.
     """
-    with ExitStack() as stack:
-        if not options.runs:
-            raise UsageError("no recording was given; expected one or more of PATH or ROBOT=PATH")
-        sources = [stack.enter_context(open_source(run.path, options.max_memory_bytes)) for run in options.runs]
+    if not options.runs:
+        raise UsageError("no recording was given; expected one or more of PATH or ROBOT=PATH")
+    with open_sources([run.path for run in options.runs], options.max_memory_bytes) as sources:
         yield _plan(sources, options)
 
 
