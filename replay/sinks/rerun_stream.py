@@ -141,7 +141,7 @@ class RrdStream:
         self._file.check()
         try:
             # The library tells nobody when it fails to write the end of the file; without that this raises.
-            RrdReader(self._file.partial).store()
+            RrdReader(self._file.readable_path()).store()
         except (RuntimeError, ValueError) as error:
             raise _not_written(error) from error
 

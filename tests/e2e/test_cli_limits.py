@@ -20,7 +20,7 @@ _LIMIT = 40
 def many(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Recordings of a robot each, as many as files may be open."""
     folder = tmp_path_factory.mktemp("many")
-    return [write_mcap(folder / f"r{n:02}.mcap", [seen(f"r{n}", float(n))]) for n in range(_LIMIT)]
+    return [write_mcap(folder / f"r{n:02}.mcap", [seen("r1", float(n), topic=f"/r{n}/map")]) for n in range(_LIMIT)]
 
 
 def run(folder: Path, *arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
