@@ -84,6 +84,7 @@ def _merge(options: argparse.Namespace) -> int:
     narrator = Narrator(notes, announce=run.robots is None)
     try:
         with open_plan(run) as plan:
+            refuse_outputs(outputs, plan.files())
             narrator.unused_topics = plan.unused_topics()
             with open_sinks(outputs, (ProgressSink(notes), narrator), say=narrator.say) as sinks:
                 report = drain(events(plan, run), sinks, run.jobs).report

@@ -50,6 +50,10 @@ class Plan:
     map_frames: Mapping[str, str | None]
     transform_feeds: tuple[Feed, ...] | None
 
+    def files(self) -> list[Path]:
+        """Return the files that are read."""
+        return [path for feed in self.feeds for path in feed.source.files]
+
     def recordings_with_transforms(self) -> list[Source] | None:
         """Return the recordings whose transforms are read; None if none are to be used."""
         if self.transform_feeds is None:
