@@ -1,4 +1,4 @@
-"""Outputs that are refused before anything is written: those that are there, that are inputs, or that have no folder."""
+"""Outputs that are refused before anything is written: those that are there, are inputs, or have no folder."""
 
 from __future__ import annotations
 
