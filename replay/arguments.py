@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from replay import __version__
-from replay.errors import UsageError
+from replay.errors import InputError, UsageError
 
 if TYPE_CHECKING:
     from replay.options import OutputOptions, RunOptions
@@ -326,9 +326,11 @@ def _mcap(path: Path) -> Path:
 def output_options(options: argparse.Namespace, run: RunOptions) -> OutputOptions:
     """Return what is to be written."""
     from replay.options import OutputOptions, seconds_to_ns
+    from replay.path_errors import path_errors
 
     first = run.runs[0].path
-    stem = first.resolve().name if first.is_dir() else first.stem
+    with path_errors(first, InputError):
+        stem = first.resolve().name if first.is_dir() else first.stem
     return OutputOptions(
         mcap=_mcap(options.output or Path(f"{stem}.merged.mcap")),
         rrd=not options.no_rrd,

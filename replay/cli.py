@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from replay import __version__, interrupts
+from replay import __version__, interrupts, standard_streams
 from replay.arguments import output_options, parser, recovery_paths, run_options
-from replay.errors import OutputError, ReplayError
+from replay.errors import ReplayError
 from replay.plain_text import plain
+from replay.standard_streams import printing, quiet_stderr, say, takes
 
 if TYPE_CHECKING:
     from replay.events import Report
@@ -29,52 +28,40 @@ EXIT_INTERRUPTED = 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program and return its exit status."""
     interrupts.listen()
+    standard_streams.prepare()
     try:
-        options = parser().parse_args(arguments)
+        options = _parsed(arguments)
         return _COMMANDS[options.command](options)
     except ReplayError as error:
-        print(f"replay: error: {plain(str(error))}", file=sys.stderr)
+        say(f"replay: error: {plain(str(error))}")
         return error.exit_code
     except KeyboardInterrupt:
-        print("replay: interrupted; nothing was written", file=sys.stderr)
+        say("replay: interrupted; nothing was written")
         return EXIT_INTERRUPTED
     except MemoryError:
-        print(
+        say(
             "replay: error: there is not enough memory; close other programs, or leave out what needs too much with "
-            "--max-memory SIZE (of merge)",
-            file=sys.stderr,
+            "--max-memory SIZE (of merge)"
         )
         return EXIT_BAD_INPUT
-    except BrokenPipeError:
-        # Whoever read our output has gone, and the files were written before any of it was printed; this keeps Python
-        # from complaining at exit.
-        _drop_output()
-        return EXIT_DONE
     except SystemExit:
         raise
     except BaseException:  # noqa: BLE001 - a bug, or a panic of Rust below, must still end with a status and a word
         import traceback
 
-        traceback.print_exc()
-        print(f"replay: this is a bug in replay {__version__}; please report it with the lines above", file=sys.stderr)
+        traceback.print_exc(file=quiet_stderr())
+        say(f"replay: this is a bug in replay {__version__}; please report it with the lines above")
         return EXIT_FAILED
 
 
-def _drop_output() -> None:
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-@contextmanager
-def _printing() -> Iterator[None]:
-    """Say of output that cannot be written, to a full disk say, that it is not there."""
+def _parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     try:
-        yield
-        sys.stdout.flush()
-    except BrokenPipeError:
+        return parser().parse_args(arguments)
+    except SystemExit:
+        quiet_stderr().flush()  # what was printed may wait still, and could not be written at exit
+        with printing():
+            pass
         raise
-    except OSError as error:
-        _drop_output()
-        raise OutputError(f"standard output: cannot be written: {error.strerror}") from error
 
 
 def _merge(options: argparse.Namespace) -> int:
@@ -90,33 +77,37 @@ def _merge(options: argparse.Namespace) -> int:
     from replay.pipeline import drain, events
     from replay.plan import open_plan
     from replay.sinks import open_sinks
-    from replay.sinks.terminal import Narrator, ProgressSink, open_console
+    from replay.sinks.terminal import Narrator, ProgressSink, open_notes
 
     cv2.setNumThreads(1)  # the threads are our own, see --jobs
-    notes = open_console(stderr=True)
-    with open_plan(run) as plan:
-        narrator = Narrator(notes, announce=run.robots is None, unused_topics=plan.unused_topics())
-        with open_sinks(outputs, (ProgressSink(notes), narrator), say=narrator.say) as sinks:
-            report = drain(events(plan, run), sinks, run.jobs).report
+    notes = open_notes()
+    narrator = Narrator(notes, announce=run.robots is None)
     try:
+        with open_plan(run) as plan:
+            refuse_outputs(outputs, plan.files())
+            narrator.unused_topics = plan.unused_topics()
+            with open_sinks(outputs, (ProgressSink(notes), narrator), say=narrator.say) as sinks:
+                report = drain(events(plan, run), sinks, run.jobs).report
+        status = EXIT_NOT_ALL_MERGED if options.require_all and not _all_merged(report) else EXIT_DONE
         _tell(report, outputs, narrator, as_json=options.json)
     except KeyboardInterrupt:
-        print("replay: interrupted; the outputs are written", file=sys.stderr)
-        return EXIT_INTERRUPTED
-    return EXIT_NOT_ALL_MERGED if options.require_all and not _all_merged(report) else EXIT_DONE
+        if not narrator.is_published:
+            raise
+        return _interrupted_late()
+    return status
 
 
 def _tell(report: Report, outputs: OutputOptions, narrator: Narrator, *, as_json: bool) -> None:
     """Print what came of it, once it is all written."""
     from replay.sinks import output_paths
     from replay.sinks.json_file import report_text
-    from replay.sinks.terminal import open_console, print_table
+    from replay.sinks.terminal import table_text
 
-    with _printing():
-        if as_json:
-            sys.stdout.write(report_text(report))
-        else:
-            print_table(open_console(), report)
+    with printing():
+        text = report_text(report) if as_json else table_text(report)
+        if as_json and not takes(text):
+            text = report_text(report, is_ascii=True)
+        sys.stdout.write(text)
     narrator.sum_up(report, [str(path) for path in output_paths(outputs).values()])
 
 
@@ -130,7 +121,7 @@ def _info(options: argparse.Namespace) -> int:
     from replay.info import lines, summarise
 
     summary = summarise(run_options(options))
-    with _printing():
+    with printing():
         for line in lines(summary):
             print(plain(line))
     return EXIT_DONE
@@ -141,9 +132,17 @@ def _recover(options: argparse.Namespace) -> int:
 
     damaged, output = recovery_paths(options)
     found = recover(damaged, output, force=options.force)
-    for line in found.lines():
-        print(f"replay: {line}", file=sys.stderr)
+    try:
+        for line in found.lines():
+            say(f"replay: {plain(line)}")
+    except KeyboardInterrupt:
+        return _interrupted_late()
     return EXIT_DONE
+
+
+def _interrupted_late() -> int:
+    say("replay: interrupted; the outputs are written")
+    return EXIT_INTERRUPTED
 
 
 _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {"merge": _merge, "info": _info, "recover": _recover}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from replay.messages import GridMessage
 from replay.options import RunOptions
 from replay.plain_text import listed, plain
 from replay.plan import open_plan
-from replay.sources import open_source
+from replay.sources import open_sources
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
 from replay.sources.losses import Loss
 from replay.words import counted, intention, lost, unused
@@ -87,8 +86,7 @@ def summarise(options: RunOptions) -> RunSummary:
     ReplayError
         If a recording cannot be read.
     """
-    with ExitStack() as stack:
-        sources = [stack.enter_context(open_source(run.path, options.max_memory_bytes)) for run in options.runs]
+    with open_sources([run.path for run in options.runs], options.max_memory_bytes) as sources:
         inputs = tuple(_input(source) for source in sources)
     try:
         with open_plan(options) as plan:

@@ -1,4 +1,4 @@
-"""Outputs that are refused before anything is read: those that are there, that are inputs, or that have no folder."""
+"""Outputs that are refused before anything is written: those that are there, are inputs, or have no folder."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from replay.errors import OutputError, UsageError
+from replay.errors import InputError, OutputError, ReplayError, UsageError
 from replay.options import OutputOptions
+from replay.path_errors import path_errors
 from replay.sinks import all_output_paths, output_paths, refuse_existing
 from replay.sinks.partial_file import partial_name
 
@@ -31,21 +32,27 @@ def refuse_outputs(outputs: OutputOptions, inputs: Sequence[Path]) -> None:
 
 def refuse_inputs(paths: Iterable[Path], inputs: Sequence[Path]) -> None:
     """Refuse names that are those of inputs, by whatever link, or that lie in one."""
-    folders = {path.resolve() for path in inputs}
+    folders = {_resolved(path, InputError) for path in inputs}
     files = {identity for path in inputs for identity in _identities(path)}
     for path in paths:
-        resolved = path.resolve()
+        resolved = _resolved(path, OutputError)
         if {resolved, *resolved.parents} & folders or _identity(path) in files:
             raise UsageError(f"{path} is an input, or would be written into one; give another name with --output")
 
 
 def refuse_unwritable(path: Path) -> None:
     """Refuse a name that no file can have."""
-    if path.is_dir():
-        raise OutputError(f"{path}: a folder has this name; remove it, or give another --output")
-    folder = path.absolute().parent
-    if not folder.is_dir():
-        raise OutputError(f"{folder}: there is no such folder; make it, or choose another")
+    with path_errors(path, OutputError):
+        if path.is_dir():
+            raise OutputError(f"{path}: a folder has this name; remove it, or give another --output")
+        folder = path.absolute().parent
+        if not folder.is_dir():
+            raise OutputError(f"{folder}: there is no such folder; make it, or choose another")
+
+
+def _resolved(path: Path, kind: type[ReplayError]) -> Path:
+    with path_errors(path, kind):
+        return path.resolve()
 
 
 def _identities(path: Path) -> set[_Identity]:

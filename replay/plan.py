@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from replay.footprint import MemoryLimit
 from replay.init_pose import refuse_unfit
 from replay.options import NS_PER_S, RunOptions
 from replay.selection import Selected, select
-from replay.sources import open_source
+from replay.sources import open_sources
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
 from replay.transform_feeds import transform_feeds
 
@@ -49,6 +49,10 @@ class Plan:
     window: Window
     map_frames: Mapping[str, str | None]
     transform_feeds: tuple[Feed, ...] | None
+
+    def files(self) -> list[Path]:
+        """Return the files that are read."""
+        return [path for feed in self.feeds for path in feed.source.files]
 
     def recordings_with_transforms(self) -> list[Source] | None:
         """Return the recordings whose transforms are read; None if none are to be used."""
@@ -122,10 +126,9 @@ def open_plan(options: RunOptions) -> Iterator[Plan]:
     ReplayError
         If an input cannot be read, or the robots that were asked for are not there.
     """
-    with ExitStack() as stack:
-        if not options.runs:
-            raise UsageError("no recording was given; expected one or more of PATH or ROBOT=PATH")
-        sources = [stack.enter_context(open_source(run.path, options.max_memory_bytes)) for run in options.runs]
+    if not options.runs:
+        raise UsageError("no recording was given; expected one or more of PATH or ROBOT=PATH")
+    with open_sources([run.path for run in options.runs], options.max_memory_bytes) as sources:
         yield _plan(sources, options)
 
 

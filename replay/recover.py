@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -117,6 +118,8 @@ def _copied(file: PartialFile) -> Iterator[McapCopy]:
 def _opened(path: Path) -> Iterator[RecordFile]:
     with ExitStack() as stack:
         with translated(path):
+            if not stat.S_ISREG(path.stat().st_mode):  # to open one may wait for ever
+                raise InputError(f"{path}: this is no regular file; expected an MCAP that was cut off")
             file = stack.enter_context(path.open("rb"))
             size = path.stat().st_size
             is_free = try_lock(file.fileno(), shared=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,13 +23,20 @@ class RunPath:
     def parse(text: str) -> RunPath:
         """Read ``PATH`` or ``ROBOT=PATH``; a path that exists is a path even if it has an equals sign."""
         name, sign, rest = text.partition("=")
-        if not sign or Path(text).exists():
+        if not sign or _exists(text):
             return RunPath(None, Path(text))
         if rest and _NAME.fullmatch(name):
             return RunPath(name, Path(rest))
-        if not rest or not Path(rest).exists():
+        if not rest or not _exists(rest):
             return RunPath(None, Path(text))
         raise UsageError(f"{text}: {name!r} is no name for a robot; expected letters, digits, '_', '-' and '.'")
+
+
+def _exists(text: str) -> bool:
+    """Tell whether there is a file of this name; what may not be looked up is refused where it is opened."""
+    with suppress(OSError):
+        return Path(text).exists()
+    return False
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -37,7 +38,8 @@ def all_output_paths(options: OutputOptions) -> dict[str, Path]:
 
 def refuse_existing(options: OutputOptions) -> None:
     """Refuse to replace what is there, unless that was asked for."""
-    existing = [str(path) for path in all_output_paths(options).values() if path.exists()]
+    # a link that leads nowhere is there, too
+    existing = [str(path) for path in all_output_paths(options).values() if os.path.lexists(path)]
     if existing and not options.force:
         raise UsageError(f"there is already {', '.join(existing)}; give --force to replace, or another --output")
 

@@ -16,6 +16,8 @@ from replay.sinks.file_lock import try_lock
 
 # Windows neither renames nor removes a file that is open.
 _CLOSED_FIRST = os.name == "nt"
+DESCRIPTORS = Path("/dev/fd")
+"""Where open files have paths, if the system has that."""
 _ATTEMPTS = 100
 _FLAGS = os.O_RDWR | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
 _NO_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS}
@@ -75,6 +77,14 @@ class PartialFile:
         if self._descriptor is None:
             raise AssertionError("a file is claimed before it is written")
         return os.fdopen(os.dup(self._descriptor), "wb")
+
+    def readable_path(self) -> Path:
+        """Return a path to read the file by that is UTF-8, whatever its name is, where there is one."""
+        try:
+            str(self.partial).encode()
+        except UnicodeEncodeError:
+            return DESCRIPTORS / str(self._descriptor)
+        return self.partial
 
     def sync(self) -> None:
         """Wait until what was written is on the disk."""

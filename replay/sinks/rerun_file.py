@@ -15,6 +15,7 @@ from replay.decisions import Entry, decisions
 from replay.errors import OutputError
 from replay.events import Event, Finished, Merged, Noted, Report, RobotPicture, Skipped, Started
 from replay.options import NS_PER_S, OutputOptions
+from replay.plain_text import plain
 from replay.sinks import rerun_text as text
 from replay.sinks.partial_file import PartialFile
 from replay.sinks.rerun_blueprint import Span, blueprint
@@ -134,7 +135,7 @@ class _Writer:
         self._waiting.clear()
 
     def _say(self, entry: Entry) -> None:
-        level, words = entry
+        level, words = entry[0], plain(entry[1])
         if self._span is None:
             self.stream.log(DECISIONS, rr.TextLog(words, level=level), static=True)
             return

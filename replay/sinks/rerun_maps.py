@@ -17,6 +17,7 @@ from mapmerge.outcome import RobotOutcome, Status
 from mapmerge.plane import Box
 from mapmerge.resample import at_resolution
 from mapmerge.sim2 import Points, Sim2
+from replay.plain_text import plain
 from replay.sinks.rerun_entities import MERGED, MERGED_MAP, EntityPath, RobotEntities
 from replay.sinks.rerun_layout import Box as Extent
 from replay.sinks.rerun_layout import Layout, PointM, lay_out
@@ -177,7 +178,7 @@ class MapScene:
 def _label(robot: str, outcome: RobotOutcome) -> str:
     if outcome.merged_from_map is not None:
         return f"{robot} (reference)" if outcome.status is Status.REFERENCE else robot
-    lines = textwrap.wrap(outcome.reason.message, _LABEL_WIDTH)
+    lines = textwrap.wrap(plain(outcome.reason.message), _LABEL_WIDTH)
     return "\n".join([f"{robot} is not merged:", *lines])
 
 

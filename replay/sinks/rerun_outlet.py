@@ -12,9 +12,8 @@ from pathlib import Path
 from threading import Thread
 from typing import BinaryIO, Protocol
 
-from replay.sinks.partial_file import PartialFile
+from replay.sinks.partial_file import DESCRIPTORS, PartialFile
 
-_DESCRIPTORS = Path("/dev/fd")
 _READ_BYTES = 1 << 20
 
 
@@ -38,7 +37,7 @@ class Outlet(Protocol):
 
 def outlet_to(file: PartialFile) -> Outlet:
     """Return the way to a file: a pipe, where pipes have paths."""
-    return _Pipe(file.stream()) if _DESCRIPTORS.is_dir() else _Direct(file.partial)
+    return _Pipe(file.stream()) if DESCRIPTORS.is_dir() else _Direct(file.partial)
 
 
 class _Direct:
@@ -69,7 +68,7 @@ class _Pipe:
         self._written_bytes = 0
         self._reading, self._writing = os.pipe()
         self._is_opened = False
-        self.path = _DESCRIPTORS / str(self._writing)
+        self.path = DESCRIPTORS / str(self._writing)
         self._thread = Thread(target=self._copy, name="rrd", daemon=True)
         self._thread.start()
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from datetime import timedelta
 from threading import Thread
 from uuid import UUID
@@ -22,6 +24,7 @@ TICKS = "tick"
 """Number of the time, from 0: to step from one to the next, and to compare two files by, since ``rerun rrd compare``
 leaves out whatever is called log_time."""
 
+_SWITCH = "RERUN"
 _PATIENCE_S = 3.0
 _NEVER = timedelta(days=365)
 _NO_LIMIT = 1 << 40
@@ -53,9 +56,10 @@ class RrdStream:
         # Rows go to chunks by their size and never by the clock, so that two runs have the same chunks. Of each chunk
         # something is kept until the end, so small rows share one.
         batching = rr.ChunkBatcherConfig(_NEVER, _CHUNK_BYTES, _NO_LIMIT)
-        self._recording = rr.RecordingStream(
-            APPLICATION, recording_id=recording_id, send_properties=False, batcher_config=batching
-        )
+        with _switched_on():
+            self._recording = rr.RecordingStream(
+                APPLICATION, recording_id=recording_id, send_properties=False, batcher_config=batching
+            )
         self._recording.set_log_time_enabled(False)
         self._recording.set_log_tick_enabled(False)
         self._ticks = 0
@@ -137,7 +141,7 @@ class RrdStream:
         self._file.check()
         try:
             # The library tells nobody when it fails to write the end of the file; without that this raises.
-            RrdReader(self._file.partial).store()
+            RrdReader(self._file.readable_path()).store()
         except (RuntimeError, ValueError) as error:
             raise _not_written(error) from error
 
@@ -152,6 +156,17 @@ class RrdStream:
         self._broken = True
         rr.unregister_shutdown()
         Thread(target=self._recording.disconnect, daemon=True).start()
+
+
+@contextmanager
+def _switched_on() -> Iterator[None]:
+    """Let the library record, though its own switch may say off: here a recording was asked for."""
+    switch = os.environ.pop(_SWITCH, None)
+    try:
+        yield
+    finally:
+        if switch is not None:
+            os.environ[_SWITCH] = switch
 
 
 def _not_written(error: Exception) -> RuntimeError:

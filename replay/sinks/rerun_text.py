@@ -18,14 +18,14 @@ _COLUMNS = ("robot", "status", "x, m", "y, m", "yaw, °", "acceptance", "overlap
 def skipped(event: Skipped) -> Entry:
     """Say which message, or part of a recording, was not used, and why."""
     if event.place:
-        return WARN, plain(f"{event.input}: {lost(event.messages)} ({event.place}): {event.detail}")
+        return WARN, f"{event.input}: {lost(event.messages)} ({event.place}): {event.detail}"
     whose = f"{event.robot}: " if event.robot else ""
-    return WARN, plain(f"{whose}a message of {event.topic} was skipped: {event.detail}")
+    return WARN, f"{whose}a message of {event.topic} was skipped: {event.detail}"
 
 
 def noted(event: Noted) -> Entry:
     """Say what a reader should know."""
-    return WARN, plain(f"{event.robot}: {event.message}" if event.robot else event.message)
+    return WARN, f"{event.robot}: {event.message}" if event.robot else event.message
 
 
 def outcome(report: Report) -> Iterator[Entry]:
@@ -47,7 +47,7 @@ def robots_table(report: Report) -> str:
 
 def about(report: Report) -> str:
     """Return inputs and settings in Markdown."""
-    parts = [f"# replay {report['version']}", f"Reference: **{report['reference']}**", "## Inputs"]
+    parts = [f"# replay {report['version']}", f"Reference: **{plain(report['reference'])}**", "## Inputs"]
     parts += [_block(item) for item in report["inputs"]]
     parts += ["## Settings", _block(report["settings"])]
     return "\n\n".join(parts) + "\n"

@@ -7,12 +7,13 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from replay.decisions import decisions
 from replay.events import Event, Merged, Noted, Report, Skipped, Started
 from replay.options import NS_PER_S
 from replay.plain_text import plain
+from replay.standard_streams import quiet_stderr
 from replay.words import counted, intention, lost, recovered, unused
 
 if TYPE_CHECKING:
@@ -70,14 +71,15 @@ class Narrator:
     ----------
     announce
         Whether to say which robots were chosen.
-    unused_topics
-        Map topics that are no robot's.
     """
 
-    def __init__(self, console: Console, *, announce: bool, unused_topics: Sequence[str] = ()) -> None:
+    def __init__(self, console: Console, *, announce: bool) -> None:
+        self.unused_topics: Sequence[str] = ()
+        """Map topics that are no robot's."""
+        self.is_published = False
+        """Whether all files of the run have their final names."""
         self._console = console
         self._announce = announce
-        self._unused = unused_topics
         self._begin_s = perf_counter()
         self._merge_s = 0.0
         self._render_s = 0.0
@@ -89,8 +91,8 @@ class Narrator:
         """Say what is worth a line, and add up the time."""
         if isinstance(event, Started) and self._announce:
             self.say(intention([f"{item.robot} ({item.topic})" for item in event.robots], "merging {} into {}"))
-            if self._unused:
-                self.say(unused(self._unused))
+            if self.unused_topics:
+                self.say(unused(self.unused_topics))
         elif isinstance(event, Skipped):
             self._say_skipped(event)
         elif isinstance(event, Noted):
@@ -146,23 +148,31 @@ class Narrator:
         """Do nothing."""
 
     def publish(self) -> None:
-        """Do nothing: there is no file."""
+        """Take note that all files have been published."""
+        self.is_published = True
 
     def discard(self) -> None:
         """Do nothing."""
 
 
-def open_console(*, stderr: bool = False) -> Console:
+def open_notes() -> Console:
+    """Return a console on standard error, which falls silent where that cannot be written."""
+    return _console(quiet_stderr())
+
+
+def _console(stream: IO[str]) -> Console:
     """Return a console; where there is no terminal, lines are not broken at its width."""
     from rich.console import Console
 
-    stream = sys.stderr if stderr else sys.stdout
     width = None if stream.isatty() else _WIDTH_WHERE_NO_TERMINAL
-    return Console(stderr=stderr, width=width, highlight=False, soft_wrap=False)
+    return Console(file=stream, width=width, highlight=False, soft_wrap=False)
 
 
-def print_table(console: Console, report: Report) -> None:
-    """Print a row for each robot: status, pose (its scale if that is free), agreement, confidence if known, reason."""
+def table_text(report: Report) -> str:
+    """Return a row for each robot: status, pose (its scale if that is free), agreement, confidence if known, reason.
+
+    It is made for standard output, and not printed: of an error there, the library would end the program.
+    """
     from rich.table import Table
     from rich.text import Text
 
@@ -186,7 +196,10 @@ def print_table(console: Console, report: Report) -> None:
             *([_share(row["confidence"], 4)] if known else []),
             Text(plain(row["reason"]["message"])),
         )
-    console.print(table)
+    console = _console(sys.stdout)
+    with console.capture() as captured:
+        console.print(table)
+    return captured.get()
 
 
 def _pose(pose: dict[str, float] | None) -> tuple[str, ...]:

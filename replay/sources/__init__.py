@@ -5,6 +5,9 @@ A format is one module with a class that has `SourceClass`'s shape, and one row 
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Protocol, cast
@@ -26,6 +29,10 @@ SOURCES: dict[str, str] = {
 }
 
 _HEAD_BYTES = 4096
+# Of all outputs together, of the Rerun library's threads (which abort the program if there are none), and of imports.
+_SPARE_FILES = 16
+# Its parts are opened when they are due: one, and a copy of it.
+_FILES_OF_A_FOLDER = 2
 _EXPECTED = "a ROS 1 bag, an MCAP file, a ROS 2 bag folder, a .db3 file or the .yaml of a saved map"
 _OTHERS = (
     ((b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"PK\x03\x04", b"\x04\x22\x4d\x18"), "it is an archive: unpack it first"),
@@ -66,6 +73,30 @@ def open_source(path: Path, most_bytes: int | None = None) -> Source:
             if source.recognises(path, head):
                 return source(path, most_bytes=MOST_BYTES if most_bytes is None else most_bytes)
         raise InputError(_unknown(path, head))
+
+
+@contextmanager
+def open_sources(paths: Sequence[Path], most_bytes: int | None = None) -> Iterator[list[Source]]:
+    """Open several recordings, and see that as many files more can be open as a run needs.
+
+    Raises
+    ------
+    InputError
+        If one cannot be read, or too many files are open then: where libraries below can open none, the program ends.
+    """
+    with ExitStack() as stack:
+        sources = [stack.enter_context(open_source(path, most_bytes)) for path in paths]
+        for source in sources[-1:]:
+            with translated(source.path):
+                _open_and_close(_SPARE_FILES + _FILES_OF_A_FOLDER * sum(path.is_dir() for path in paths))
+        yield sources
+
+
+def _open_and_close(count: int) -> None:
+    """Open as many files at once, and close them."""
+    with ExitStack() as stack:
+        for _ in range(count):
+            stack.callback(os.close, os.open(os.devnull, os.O_RDONLY))
 
 
 def _source_class(name: str) -> SourceClass:

@@ -71,6 +71,10 @@ class Source(Protocol):
     losses: Losses
 
     @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that are read; a folder stands for all that is in it."""
+
+    @property
     def info(self) -> SourceInfo:
         """What the recording holds."""
 

@@ -72,7 +72,14 @@ def _line(path: Path, error: Exception, part: str) -> str:
 
 
 class Closing:
-    """Makes a context manager of whatever has a `close`."""
+    """Makes a context manager of a source that has a `close`."""
+
+    path: Path
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that are read; a folder stands for all that is in it."""
+        return (self.path,)
 
     def close(self) -> None:
         """Release files and temporary copies."""

@@ -69,6 +69,11 @@ class SavedMap(Closing):
         with translated(path, _foreign()):
             self._description = _description(path)
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Its description, and its image wherever that is."""
+        return self.path, self._description.image
+
     @classmethod
     def recognises(cls, path: Path, head: bytes) -> bool:
         """Tell whether this is a YAML file, or a text that names an image."""

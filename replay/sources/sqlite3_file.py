@@ -68,6 +68,11 @@ class Sqlite3File(Closing):
             self._times_ns = self._tables.times_ns()
             self._resources = stack.pop_all()
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file, and what SQLite left beside it."""
+        return self.path, *beside(self.path.resolve()).values()
+
     @classmethod
     def recognises(cls, path: Path, head: bytes) -> bool:
         """Tell whether this is a SQLite file."""

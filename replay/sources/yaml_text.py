@@ -38,6 +38,8 @@ def load_yaml(path: Path) -> object:
         If it cannot be read, or is larger or deeper than any that describes a recording, or refers to itself.
     """
     with translated(path, foreign_errors()):
+        if not path.is_file():
+            raise InputError(f"{path}: this is no regular file; expected a description of a recording")
         size = path.stat().st_size
         if size > MOST_BYTES:
             raise InputError(f"{path}: it has {size} bytes; expected a description of {MOST_BYTES} bytes at most")

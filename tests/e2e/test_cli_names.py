@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from mcap.writer import Writer
 from rerun.chunk import RrdReader
 
 from tests.bags import Recorded, write_mcap
 from tests.outputs import topics
 from tests.program import Program
-from tests.runs import seen
+from tests.runs import bare_room, seen
 
 HOSTILE = {
     "an escape sequence": "r\x1b[2J\x1b[31m",
@@ -37,6 +40,17 @@ def harmless(text: str) -> bool:
     return all(line.isprintable() for line in text.split("\n")) and len(max(text.split("\n"), key=len)) < 6000
 
 
+def texts(value: Any) -> Iterator[str]:
+    """Yield all texts within a value, however deep."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        yield from texts(list(value.values()))
+    elif isinstance(value, list):
+        for each in value:
+            yield from texts(each)
+
+
 @pytest.mark.parametrize("name", HOSTILE.values(), ids=HOSTILE)
 class TestNames:
     def test_of_robots(self, replay: Program, tmp_path: Path, name: str) -> None:
@@ -56,6 +70,50 @@ class TestNames:
         assert all(topic.isascii() and topic.isprintable() and ".." not in topic for topic in topics(ran.mcap))
         paths = {chunk.entity_path for chunk in RrdReader(tmp_path / "out.rrd").stream()}
         assert all(path.isprintable() for path in paths)
+
+    def test_in_the_rerun_recording(self, replay: Program, tmp_path: Path, name: str) -> None:
+        """Also of the reference, whose name is in the reasons of the others, and of what is skipped or not placed."""
+        reference, placed, alone = f"{name}0", f"{name}2", f"{name}3"
+        messages = [
+            seen("r1", 0.0, topic=f"/{reference}/map"),
+            seen("r1", 1.0, topic=f"/{reference}/map", resolution=0.0),
+            seen("r2", 2.0, topic=f"/{placed}/map"),
+            seen("r3", 3.0, bare_room(), topic=f"/{alone}/map"),
+        ]
+        run = write_mcap(tmp_path / "run.mcap", messages)
+        ran = replay("merge", run, "-o", "out.mcap", "--robots", f"{reference},{placed},{alone}", "--images", "none")
+        assert ran.status == 0, ran.err
+        found = [
+            text
+            for chunk in RrdReader(tmp_path / "out.rrd").stream()
+            if not str(chunk.entity_path).startswith("/__")
+            for row in chunk.to_record_batch().to_pylist()
+            for text in texts(row)
+        ]
+        assert any("is not merged" in text for text in found)
+        assert any("was skipped" in text for text in found)
+        assert not [text for text in found if not harmless(text)]
+
+    def test_of_topics_that_are_recovered(self, replay: Program, tmp_path: Path, name: str) -> None:
+        """Of a channel without its schema, and of one whose name is lost."""
+        run = tmp_path / "run.mcap"
+        with run.open("wb") as file:
+            writer = Writer(file, use_chunking=False)
+            writer.start()
+            schema = writer.register_schema("a", "ros2msg", b"")
+            channels = [writer.register_channel(topic, "cdr", schema) for topic in ("/a", f"/{name}/map")]
+            for channel in channels:
+                writer.add_message(channel, 1, b"", 1)
+            writer.finish()
+        content = run.read_bytes()
+        at = content.index(f"/{name}/map".encode())
+        # the channel's record is its id, its schema's, and the length of its name
+        run.write_bytes(content[: at - 6] + b"\x63\x00" + content[at - 4 :])
+        ran = replay("recover", run, "-o", "out.mcap")
+        assert ran.status == 0, ran.err
+        assert harmless(ran.err), ran.err
+        assert all(line.startswith("replay: ") for line in ran.err.splitlines())
+        assert "replay: left out" in ran.err
 
     def test_of_frames(self, replay: Program, tmp_path: Path, name: str) -> None:
         messages = [seen("r1", 0.0, frame=name), seen("r2", 1.0, frame=f"{name}2")]

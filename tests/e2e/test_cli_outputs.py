@@ -9,11 +9,12 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from replay.events import Finished
 from replay.pipeline import drain
-from tests.bags import write_mcap, write_rosbag2
+from tests.bags import write_bare_db3, write_mcap, write_rosbag2, write_saved_map
 from tests.disks import read_only, small_disk
 from tests.program import Program
 from tests.runs import two_robots
@@ -123,6 +124,35 @@ class TestInputsAreNeverWritten:
         (tmp_path / "out.mcap").hardlink_to(part)
         assert "is an input" in replay.merge(bag).error
         assert part.read_bytes() == kept
+
+    @pytest.mark.parametrize("link", [None, Path.symlink_to, Path.hardlink_to])
+    def test_the_image_of_a_saved_map(
+        self, replay: Program, tmp_path: Path, link: Callable[[Path, Path], None] | None
+    ) -> None:
+        """It may lie anywhere, and have any name."""
+        run = write_saved_map(tmp_path / "map.yaml", np.zeros((40, 50), np.uint8))
+        (image,) = set(tmp_path.iterdir()) - {run}
+        if link is None:
+            run.write_text(run.read_text().replace(image.name, "out.json"))
+            image = image.rename(tmp_path / "out.json")
+        else:
+            link(tmp_path / "out.json", image)
+        kept = image.read_bytes()
+        ran = replay.merge(run)
+        assert ran.status == 2
+        assert "out.json is an input" in ran.error
+        assert image.read_bytes() == kept
+        assert names(tmp_path) == sorted({"map.yaml", image.name, "out.json"})
+
+    @pytest.mark.parametrize("suffix", ["-wal", "-journal"])
+    def test_what_lies_beside_a_db3(self, replay: Program, tmp_path: Path, suffix: str) -> None:
+        run = write_bare_db3(tmp_path / "run.db3", two_robots())
+        (tmp_path / "out.json").write_bytes(b"x" * 600)
+        (tmp_path / f"run.db3{suffix}").hardlink_to(tmp_path / "out.json")
+        ran = replay.merge(run)
+        assert ran.status == 2
+        assert "out.json is an input" in ran.error
+        assert (tmp_path / "out.json").read_bytes() == b"x" * 600
 
     def test_under_the_temporary_name(self, replay: Program, two: Path, tmp_path: Path) -> None:
         shutil.copy(two, tmp_path / "run.mcap.partial")

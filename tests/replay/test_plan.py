@@ -127,7 +127,7 @@ def test_inputs_are_closed(monkeypatch: pytest.MonkeyPatch) -> None:
         def close(self) -> None:
             closed.append(self)
 
-    monkeypatch.setattr("replay.plan.open_source", lambda path, _: Source(growing(path.stem)))
+    monkeypatch.setattr("replay.sources.open_source", lambda path, _: Source(growing(path.stem)))
     with pytest.raises(UsageError):
         planned("r1.bag", "r2.bag", robots=("r9",))
     assert len(closed) == 2
