@@ -61,6 +61,13 @@ class Feed:
     leads_ns: Mapping[str, int] = field(default_factory=dict)
     memory: MemoryLimit | None = None
 
+    def assembled(self, last: Grid | None, message: GridMessage | UpdateMessage) -> Grid:
+        """Return a robot's map after a message; raises as `assemble` does, or because it would need too much memory."""
+        grid = assemble(last, message)
+        if self.memory is not None and isinstance(message, UpdateMessage):  # full maps are checked as they are decoded
+            self.memory.refuse_over(grid)
+        return grid
+
 
 @dataclass(frozen=True, slots=True)
 class Window:
@@ -292,7 +299,7 @@ class _Before:
         if older and isinstance(content, GridMessage):
             return
         try:
-            grid = assemble(kept[1] if kept and arrival.robot not in self._lost else None, content)
+            grid = arrival.feed.assembled(kept[1] if kept and arrival.robot not in self._lost else None, content)
         except BadMessage:
             return
         self._lost.discard(arrival.robot)
