@@ -21,8 +21,14 @@ from replay.footprint import MemoryLimit
 from replay.messages import GridMessage, TransformMessage, UpdateMessage
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, RawMessage, Source
-from replay.stamps import Stamp, StampCheck
+from replay.stamps import LAST_NS, Stamp, StampCheck
 from replay.words import moment
+
+_NO_TIME = BadMessage(
+    SkipCause.BAD_TIME,
+    "nothing tells when it was: its header has no time that can be believed, or is not asked, and it was recorded at "
+    f"one that no ROS stamp can hold; at most {LAST_NS} ns was expected",
+)
 
 Content = GridMessage | UpdateMessage | TransformMessage | Skipped | Noted
 
@@ -54,6 +60,13 @@ class Feed:
     untimed_ns: int
     leads_ns: Mapping[str, int] = field(default_factory=dict)
     memory: MemoryLimit | None = None
+
+    def assembled(self, last: Grid | None, message: GridMessage | UpdateMessage) -> Grid:
+        """Return a robot's map after a message; raises as `assemble` does, or because it would need too much memory."""
+        grid = assemble(last, message)
+        if self.memory is not None and isinstance(message, UpdateMessage):  # full maps are checked as they are decoded
+            self.memory.refuse_over(grid)
+        return grid
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +157,8 @@ def _stamped(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
         yield from _lost(feed, raw.log_time_ns, times.newest_ns)
         content = _decoded(feed, raw)
         time_ns = times.of(raw, content)
+        if time_ns is None:
+            content, time_ns = _skipped(feed, raw, _NO_TIME), times.newest_ns
         yield from (Arrival(time_ns, feed, raw, note) for note in times.new_notes())
         early = window.start_ns is not None and time_ns < window.start_ns
         if early and isinstance(content, GridMessage | UpdateMessage):
@@ -187,7 +202,7 @@ class _Times:
 
     Where a message does not say, because it cannot be decoded or its header has no time, or one that cannot be believed
     (see `replay.stamps`), it is its log time, shifted as that of the message before it on its topic was; without one,
-    the newest time so far.
+    the newest time so far. Where no stamp can hold its log time either, nothing tells when it was.
     """
 
     def __init__(self, feed: Feed, tally: Tally) -> None:
@@ -199,20 +214,36 @@ class _Times:
         self._notes: list[Noted] = []
         self.newest_ns = feed.untimed_ns
 
-    def of(self, raw: RawMessage, content: Content) -> int:
-        """Return the time of a message."""
-        clock = self._feed.clocks[raw.topic]
-        if clock == "none":
+    def of(self, raw: RawMessage, content: Content) -> int | None:
+        """Return the time of a message; None if nothing tells it."""
+        if self._feed.clocks[raw.topic] == "none":
             return self._feed.untimed_ns
-        if isinstance(content, TransformMessage) and content.stamp_ns <= 0:
-            time_ns = max(0, raw.log_time_ns + self._feed.offsets_ns[raw.topic])
-        elif isinstance(content, Skipped | Noted) or (clock == "header" and not self._believes(raw, content.stamp_ns)):
-            time_ns = self._guessed(raw)
-        else:
-            time_ns = max(0, stamp_ns(clock, raw, content) + self._feed.offsets_ns[raw.topic])
-            self._leads_ns[raw.topic] = time_ns - raw.log_time_ns
-        self.newest_ns = max(self.newest_ns, time_ns)
+        time_ns = self._time_ns(raw, content)
+        if time_ns is None and isinstance(content, Skipped | Noted):
+            return self.newest_ns
+        self.newest_ns = max(self.newest_ns, time_ns or 0)
         return time_ns
+
+    def _time_ns(self, raw: RawMessage, content: Content) -> int | None:
+        is_recorded = raw.log_time_ns <= LAST_NS
+        clock = self._feed.clocks[raw.topic]
+        if isinstance(content, Skipped | Noted):
+            return self._guessed(raw)
+        if isinstance(content, TransformMessage) and content.stamp_ns <= 0:
+            return self._shifted(raw, raw.log_time_ns) if is_recorded else None
+        if clock == "header" and not self._believes(raw, content.stamp_ns):
+            return self._guessed(raw)
+        own_ns = stamp_ns(clock, raw, content)
+        if own_ns > LAST_NS:
+            return None
+        time_ns = self._shifted(raw, own_ns)
+        if is_recorded:
+            self._leads_ns[raw.topic] = time_ns - raw.log_time_ns
+        return time_ns
+
+    def _shifted(self, raw: RawMessage, time_ns: int) -> int:
+        """Return a time on the reference's clock."""
+        return min(max(0, time_ns + self._feed.offsets_ns[raw.topic]), LAST_NS)
 
     def new_notes(self) -> list[Noted]:
         """Return what is to be said of the times that were given since this was asked last."""
@@ -224,8 +255,13 @@ class _Times:
         if own_ns <= 0:
             return False
         stamp = Stamp(own_ns, raw.log_time_ns)
-        if self._checks[raw.topic].believes(stamp):
+        if own_ns <= LAST_NS and self._checks[raw.topic].believes(stamp):
             return True
+        if raw.log_time_ns <= LAST_NS:
+            self._doubt(raw, stamp)
+        return False
+
+    def _doubt(self, raw: RawMessage, stamp: Stamp) -> None:
         self._tally.bad_stamps += 1
         if raw.topic not in self._doubted:
             self._doubted.add(raw.topic)
@@ -235,11 +271,12 @@ class _Times:
                 "such a message is taken at the time at which it was recorded"
             )
             self._notes.append(Noted(self._feed.robot_of.get(raw.topic, ""), message))
-        return False
 
-    def _guessed(self, raw: RawMessage) -> int:
+    def _guessed(self, raw: RawMessage) -> int | None:
+        if raw.log_time_ns > LAST_NS:
+            return None
         if raw.topic in self._leads_ns:
-            return max(0, raw.log_time_ns + self._leads_ns[raw.topic])
+            return min(max(0, raw.log_time_ns + self._leads_ns[raw.topic]), LAST_NS)
         self._tally.late += 1
         return self.newest_ns
 
@@ -262,7 +299,7 @@ class _Before:
         if older and isinstance(content, GridMessage):
             return
         try:
-            grid = assemble(kept[1] if kept and arrival.robot not in self._lost else None, content)
+            grid = arrival.feed.assembled(kept[1] if kept and arrival.robot not in self._lost else None, content)
         except BadMessage:
             return
         self._lost.discard(arrival.robot)

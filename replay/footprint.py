@@ -53,7 +53,7 @@ class MemoryLimit:
     merge: MergeConfig
 
     def refuse_over(self, grid: Grid) -> None:
-        """Refuse a map that needs more.
+        """Refuse a map that needs more: unknown margins take no more than their bytes, but those they do.
 
         Raises
         ------
@@ -64,7 +64,8 @@ class MemoryLimit:
 
         if may_need_bytes(grid, self.merge) <= self.max_bytes:
             return
-        needed = needed_bytes(grid.cropped_to_known(), self.merge)
+        known = grid.cropped_to_known()
+        needed = needed_bytes(known, self.merge) + grid.cells.size - known.cells.size
         if needed > self.max_bytes:
             raise BadMessage(
                 SkipCause.OVER_MEMORY,

@@ -9,8 +9,7 @@ from pathlib import Path
 from replay.errors import InputError, OutputError, ReplayError, UsageError
 from replay.options import OutputOptions
 from replay.path_errors import path_errors
-from replay.sinks import all_output_paths, output_paths, refuse_existing
-from replay.sinks.partial_file import partial_name
+from replay.sinks import output_paths, refuse_existing, reserved_paths
 
 _Identity = tuple[int, int]
 
@@ -23,8 +22,7 @@ def refuse_outputs(outputs: OutputOptions, inputs: Sequence[Path]) -> None:
     ReplayError
         With the reason.
     """
-    finals = all_output_paths(outputs).values()
-    refuse_inputs([name for path in finals for name in (path, partial_name(path))], inputs)
+    refuse_inputs(reserved_paths(outputs), inputs)
     refuse_existing(outputs)
     for path in output_paths(outputs).values():
         refuse_unwritable(path)

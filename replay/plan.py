@@ -18,6 +18,7 @@ from replay.options import NS_PER_S, RunOptions
 from replay.selection import Selected, select
 from replay.sources import open_sources
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
+from replay.stamps import LAST_NS
 from replay.transform_feeds import transform_feeds
 
 MERGED_FRAME = "merged"
@@ -147,7 +148,7 @@ def _plan(sources: list[Source], options: RunOptions) -> Plan:
         options.reorder_window_ns,
     )
     _refuse_empty(window, start_ns, stop_ns)
-    untimed_ns = start_ns if window.start_ns is None else max(start_ns, window.start_ns)
+    untimed_ns = min(start_ns if window.start_ns is None else max(start_ns, window.start_ns), LAST_NS)
     frame_ids = _frame_ids(probes)
     return Plan(
         infos,

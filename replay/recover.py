@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import stat
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,10 +13,10 @@ from replay.interrupts import held_off
 from replay.mcap_walk import Walk
 from replay.options import OutputOptions
 from replay.outputs import refuse_inputs, refuse_unwritable
-from replay.sinks import all_output_paths, refuse_existing
+from replay.sinks import all_output_paths, claim, refuse_existing, remove_left_over, reserved_paths
 from replay.sinks.file_lock import try_lock
 from replay.sinks.mcap_copy import McapCopy
-from replay.sinks.partial_file import PartialFile
+from replay.sinks.partial_file import PartialFile, partial_name, recovering_name
 from replay.sinks.publication import publish
 from replay.sources.boundary import translated
 from replay.sources.mcap_records import MAGIC, RecordFile, written_bytes
@@ -40,6 +40,8 @@ class Recovery:
         Whether the file was not cut off.
     left_out
         What is not in the new file, and why.
+    removed
+        What is to be said of files that an earlier run left.
     """
 
     damaged: Path
@@ -48,9 +50,11 @@ class Recovery:
     until_ns: int
     is_whole: bool
     left_out: tuple[str, ...]
+    removed: tuple[str, ...] = ()
 
     def lines(self) -> Iterator[str]:
         """Yield what is said at the terminal."""
+        yield from self.removed
         for what in self.left_out[:_LEFT_OUT_NAMED]:
             yield f"left out: {what}"
         if len(self.left_out) > _LEFT_OUT_NAMED:
@@ -81,30 +85,40 @@ def recover(damaged: Path, output: Path, *, force: bool = False) -> Recovery:
         If nothing can be recovered, or the new file cannot be written.
     """
     options = OutputOptions(output, force=force)
-    refuse_inputs([*all_output_paths(options).values(), _temporary(output)], [damaged])
+    is_partial = _recovers_partial(output, damaged)
+    own = {partial_name(output)} if is_partial else set[Path]()
+    refuse_inputs([path for path in reserved_paths(options) if path not in own], [damaged])
     refuse_existing(options)
     refuse_unwritable(output)
+    removed: list[str] = []
     with ExitStack() as stack:
         walk = Walk(stack.enter_context(_opened(damaged)))
-        copy = stack.enter_context(_copied(PartialFile(output, _temporary(output))))
+        # under the name of runs, so that none writes the same output
+        file = PartialFile(output, recovering_name(output) if is_partial else None)
+        copy = stack.enter_context(_copied(file, removed.append))
+        if not is_partial:
+            remove_left_over([PartialFile(output, recovering_name(output))], removed.append)
         walk.to(copy)
         copy.finish()
         with held_off():
             refuse_existing(options)
-            publish([copy], list(all_output_paths(options).values()))
-    return Recovery(damaged, output, walk.messages, walk.until_ns, walk.is_whole, tuple(walk.left_out))
+            publish([copy], [file], list(all_output_paths(options).values()))
+    left_out = tuple(walk.left_out)
+    return Recovery(damaged, output, walk.messages, walk.until_ns, walk.is_whole, left_out, tuple(removed))
 
 
-def _temporary(output: Path) -> Path:
-    """Return a temporary name that is not the one of runs, which is what is recovered."""
-    return output.with_name(f"{output.name}.recovering")
+def _recovers_partial(output: Path, damaged: Path) -> bool:
+    """Tell whether it is what a run left of this output: then its own lock keeps other runs out meanwhile."""
+    with suppress(OSError):
+        return damaged.samefile(partial_name(output))
+    return False
 
 
 @contextmanager
-def _copied(file: PartialFile) -> Iterator[McapCopy]:
+def _copied(file: PartialFile, say: Callable[[str], object]) -> Iterator[McapCopy]:
     """Open a new MCAP; it is removed unless it has its final name at the end."""
     try:
-        file.claim()
+        claim(file, say)
         copy = McapCopy(file)
         try:
             yield copy

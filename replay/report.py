@@ -19,7 +19,7 @@ from mapmerge.prior import Prior
 from mapmerge.reasons import Reason
 from mapmerge.sim2 import Sim2, wrap_angle
 from replay.events import Noted, Report, RobotInput, Skipped
-from replay.sources.losses import MOST_PLACES, OTHER_PLACES
+from replay.sources.losses import Listing
 
 SCHEMA = "replay.report/1"
 _DIGITS = 6
@@ -48,7 +48,7 @@ class ReportBuilder:
         self._updates: Counter[str] = Counter()
         self._skipped: Counter[str] = Counter()
         self._places: dict[tuple[str, str, str, str], Json] = {}
-        self._places_of: dict[tuple[str, str, str], set[str]] = {}
+        self._listing = Listing()
         self._first_merged_ns: dict[str, int] = {}
         self._history: list[Json] = []
         self._notes: list[Json] = []
@@ -58,14 +58,15 @@ class ReportBuilder:
     def skip(self, event: Skipped) -> None:
         """Count a message, or a part of a recording, that was not used."""
         self._skipped[event.cause] += _at_least(event)
-        key = str(event.cause), event.input, event.topic, self._listed_place(event)
+        topic, place = self._listing.at((event.cause, event.input), event.topic, event.place)
+        key = str(event.cause), event.input, topic, place
         there = self._places.setdefault(
             key,
             {
                 "cause": key[0],
                 "input": event.input,
-                "topic": event.topic,
-                "place": key[3],
+                "topic": topic,
+                "place": place,
                 "messages": 0,
                 "first_log_time_ns": event.log_time_ns,
                 "detail": event.detail,
@@ -73,14 +74,6 @@ class ReportBuilder:
         )
         known = there["messages"] is not None and event.messages is not None
         there["messages"] = there["messages"] + event.messages if known else None
-
-    def _listed_place(self, event: Skipped) -> str:
-        """Return the place to list; of one cause and topic, all but the first few are listed as one."""
-        known = self._places_of.setdefault((event.cause, event.input, event.topic), set())
-        if event.place not in known and len(known) >= MOST_PLACES:
-            return OTHER_PLACES
-        known.add(event.place)
-        return event.place
 
     def note(self, event: Noted) -> None:
         """Keep what a reader should know."""

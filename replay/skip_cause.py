@@ -24,6 +24,8 @@ class SkipCause(StrEnum):
     """An update of a part, before any full map, or after one that is lost."""
     UPDATE_OUTSIDE_GRID = "update_outside_grid"
     """An update of a part that is not within the last full map."""
+    BAD_TIME = "bad_time"
+    """Nothing tells when it was: neither its header nor its log time is one that a ROS stamp can hold."""
     BAD_TRANSFORM = "bad_transform"
     """A transform in it has no finite shift, no rotation, or not two frames; the others in it are used."""
     OVER_MEMORY = "over_memory"

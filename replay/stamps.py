@@ -17,6 +17,9 @@ _FASTEST = 10
 _FOLLOWED = 3
 
 
+LAST_NS = (NS_PER_S << 31) - 1
+"""The last time that a ROS 2 stamp can hold, in the year 2038: its seconds have 32 bits, one of them for the sign."""
+
 PROBED = 3
 """So many messages tell how far the stamps of a topic are ahead when it begins."""
 

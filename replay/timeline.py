@@ -9,7 +9,6 @@ from itertools import groupby
 
 from mapmerge.grid import Grid
 from replay.arrivals import Arrival, Feed, Tally, Window, in_order
-from replay.assemble import assemble
 from replay.errors import BadMessage, InputError
 from replay.events import Noted, Skipped
 from replay.messages import FrameLink, TransformMessage
@@ -125,7 +124,7 @@ def _taken(
         yield Transforms(arrival.feed.source, None if always else arrival.stamp_ns, content.links)
     else:
         try:
-            latest[arrival.robot] = assemble(latest.get(arrival.robot), content)
+            latest[arrival.robot] = arrival.feed.assembled(latest.get(arrival.robot), content)
         except BadMessage as error:
             yield arrival.skipped(error)
             return

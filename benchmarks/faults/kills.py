@@ -20,6 +20,7 @@ from mcap.reader import make_reader
 from replay.errors import InputError
 from replay.recover import recover
 from replay.sinks.partial_file import partial_name
+from replay.sinks.publication import aside_name
 
 SAMPLE = Path(__file__).resolve().parents[2] / "samples" / "two_robots.mcap"
 FINALS = ("out.mcap", "out.rrd", "out.json")
@@ -117,7 +118,8 @@ class _Trial:
 
     def _broken(self, out: Path, left: tuple[str, ...]) -> Iterator[str]:
         """Yield what is wrong with the final names."""
-        if strange := set(left) - {*FINALS, *(partial_name(Path(name)).name for name in FINALS)}:
+        temporary = {of(Path(name)).name for name in FINALS for of in (partial_name, aside_name)}
+        if strange := set(left) - {*FINALS, *temporary}:
             yield f"there is {', '.join(sorted(strange))}"
         ages = {name: self._age(out / name) for name in FINALS if name in left}
         for name, age in ages.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
@@ -13,10 +13,20 @@ from replay.errors import UsageError
 from replay.interrupts import held_off
 from replay.options import OutputOptions
 from replay.sinks.base import Sink
-from replay.sinks.partial_file import PartialFile, partial_name
-from replay.sinks.publication import publish
+from replay.sinks.partial_file import PartialFile, partial_name, recovering_name
+from replay.sinks.publication import aside_name, publish
 
-__all__ = ["SINKS", "Sink", "all_output_paths", "open_sinks", "output_paths", "refuse_existing"]
+__all__ = [
+    "SINKS",
+    "Sink",
+    "all_output_paths",
+    "claim",
+    "open_sinks",
+    "output_paths",
+    "refuse_existing",
+    "remove_left_over",
+    "reserved_paths",
+]
 
 SINKS: dict[str, str] = {
     "mcap": "replay.sinks.mcap_file:McapSink",
@@ -34,6 +44,12 @@ def output_paths(options: OutputOptions) -> dict[str, Path]:
 def all_output_paths(options: OutputOptions) -> dict[str, Path]:
     """Return the files that belong together under this name, also those that are not written this time."""
     return output_paths(replace(options, rrd=True))
+
+
+def reserved_paths(options: OutputOptions) -> tuple[Path, ...]:
+    """Return all that may be written or removed: final names, temporary ones, and those of what is replaced."""
+    finals = all_output_paths(options).values()
+    return *(name(path) for path in finals for name in (Path, partial_name, aside_name)), recovering_name(options.mcap)
 
 
 def refuse_existing(options: OutputOptions) -> None:
@@ -61,8 +77,9 @@ def open_sinks(
     sinks: list[Sink] = []
     try:
         for file in files.values():
-            _claim(file, say)
-        _remove_left_over(set(all_output_paths(options).values()) - {file.path for file in files.values()}, say)
+            claim(file, say)
+        unwritten = [PartialFile(path) for name, path in all_output_paths(options).items() if name not in files]
+        remove_left_over([*unwritten, PartialFile(options.mcap, recovering_name(options.mcap))], say)
         refuse_existing(options)  # once more: another run may have published between the first time and the claim
         for name, file in files.items():
             module, _, attribute = SINKS[name].partition(":")
@@ -73,7 +90,7 @@ def open_sinks(
             sink.finish()
         with held_off():
             refuse_existing(options)
-            publish(sinks[: len(files)], list(all_output_paths(options).values()))
+            publish(sinks[: len(files)], list(files.values()), list(all_output_paths(options).values()))
             for sink in extra:
                 sink.publish()
     except BaseException:
@@ -85,16 +102,16 @@ def open_sinks(
         raise
 
 
-def _claim(file: PartialFile, say: Callable[[str], object]) -> None:
+def claim(file: PartialFile, say: Callable[[str], object]) -> None:
+    """Claim a file; say so if an earlier run left something that is removed."""
     file.claim()
     if file.replaced_bytes:
         say(f"an earlier run was cut off and left {file.partial}; it is removed")
 
 
-def _remove_left_over(unwritten: Collection[Path], say: Callable[[str], object]) -> None:
+def remove_left_over(unwritten: Iterable[PartialFile], say: Callable[[str], object]) -> None:
     """Remove what an earlier run left of files that this one does not write."""
-    for path in unwritten:
-        if partial_name(path).exists():
-            file = PartialFile(path)
-            _claim(file, say)
+    for file in unwritten:
+        if file.partial.exists():
+            claim(file, say)
             file.discard()

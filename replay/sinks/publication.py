@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
-from replay.sinks.partial_file import output_errors, sync_folder
+from replay.sinks.partial_file import PartialFile, output_errors, sync_folder
 
 
 class Written(Protocol):
@@ -17,32 +19,103 @@ class Written(Protocol):
         """Give what was written its final name."""
 
 
-def publish(written: Sequence[Written], paths: Sequence[Path]) -> None:
-    """Give what was written its final name, in place of what an earlier run wrote.
+def aside_name(path: Path) -> Path:
+    """Return the name of what an earlier run wrote while it is being replaced: in the same folder, as `path` is."""
+    return path.with_name(f"{path.name}.replaced")
 
-    Several files cannot be renamed at once. So the others of an older set are removed, the last one first, before the
-    first file is replaced; and the new ones are published in order. Whenever the last one, the report, is there, all
-    are there and of the same run; where it is missing, the first one is whole, and nothing of another run beside it.
+
+def publish(written: Sequence[Written], files: Sequence[PartialFile], paths: Sequence[Path]) -> None:
+    """Give what was written its final name, in place of what an earlier run wrote, which stays if that fails.
+
+    Several files cannot be renamed at once. So those of an older set are set aside, the last one first, before the
+    first file is replaced, and are removed when all new ones have their names, in order. Whenever the last one, the
+    report, is there, all are there and of the same run; where it is missing, the first one is whole, and nothing of
+    another run beside it. If a file cannot have its name, those that were set aside get theirs back.
 
     Parameters
     ----------
-    written
-        In the order of the files.
+    written, files
+        What was written, and its files, all of which must be there still.
     paths
-        All final names that belong together, also those that are not written this time.
+        All final names that belong together, also those that are not written this time, in the order of the files.
     """
-    folder = paths[0].absolute().parent
     for path in paths:
         with output_errors(path):
             if path.is_dir():
                 raise IsADirectoryError(errno.EISDIR, "a folder has this name")
-    for path in reversed(paths[1:]):
-        with output_errors(path):
-            path.unlink(missing_ok=True)
+    for file in files:
+        with output_errors(file.path):
+            file.check()
+    older, new = _OlderFiles(paths), list[Path]()
+    try:
+        older.set_aside()
+        for path in _published(written, files, paths[0].absolute().parent):
+            new.append(path)
+    except BaseException:
+        older.put_back(new)
+        raise
+    older.remove()
+
+
+def _published(written: Sequence[Written], files: Sequence[PartialFile], folder: Path) -> Iterator[Path]:
+    """Give each its final name; yield those that have it."""
     sync_folder(folder)
-    *others, last = written
-    for each in others:
+    for each, file in zip(written, files, strict=True):
+        if each is written[-1]:
+            sync_folder(folder)
         each.publish()
+        yield file.path
     sync_folder(folder)
-    last.publish()
-    sync_folder(folder)
+
+
+class _OlderFiles:
+    """What an earlier run wrote under the final names of this one.
+
+    Its first file keeps its name while it is set aside, by a second one, so that it is never without one. Where there
+    are no such links it is renamed as the others are.
+    """
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self._paths = paths
+        self._aside: list[Path] = []
+
+    def set_aside(self) -> None:
+        first = self._paths[0]
+        for path in reversed(self._paths):
+            with output_errors(path), suppress(FileNotFoundError):
+                if path != first or not _linked(path, aside_name(path)):
+                    path.replace(aside_name(path))
+                self._aside.append(path)
+
+    def put_back(self, new: Sequence[Path]) -> None:
+        """Undo all, the last step first: new files go before older ones have their names again.
+
+        What cannot be undone ends it, so that no files of two runs are beside each other; they stay set aside then.
+        """
+        with suppress(OSError):
+            for path in reversed(new):
+                if path != self._paths[0] or path not in self._aside:
+                    path.unlink()
+            for path in reversed(self._aside):
+                aside_name(path).replace(path)
+                # between two names of one file, a rename does nothing
+                aside_name(path).unlink(missing_ok=True)
+
+    def remove(self) -> None:
+        """Remove what was set aside; all new files have their names, so that this may fail."""
+        if self._aside:
+            for path in self._paths:
+                with suppress(OSError):
+                    aside_name(path).unlink(missing_ok=True)
+
+
+def _linked(path: Path, name: Path) -> bool:
+    """Give a file a second name; tell whether that is possible."""
+    try:
+        name.unlink(missing_ok=True)
+        os.link(path, name, follow_symlinks=False)
+    except FileNotFoundError:
+        raise
+    except (OSError, NotImplementedError):
+        return False
+    return True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from replay.skip_cause import SkipCause
@@ -38,8 +38,32 @@ class Loss:
 MOST_PLACES = 20
 """Of one cause and topic, so many places are listed; a recording may be damaged at each of its messages."""
 
+MOST_LISTED = 100
+"""Of one cause, so many places are listed, whatever their topics: of those there may be as many as messages."""
+
 OTHER_PLACES = "other places"
 """What stands for the places that are not listed."""
+
+
+class Listing:
+    """Chooses the places that are listed: the first few of each topic, and of all topics of one kind of loss."""
+
+    def __init__(self) -> None:
+        self._listed: Counter[Hashable] = Counter()
+        self._places: dict[tuple[Hashable, str], set[str]] = {}
+
+    def at(self, kind: Hashable, topic: str, place: str) -> tuple[str, str]:
+        """Return the topic and the place to list a loss under."""
+        places = self._places.get((kind, topic), set())
+        if place in places:
+            return topic, place
+        if len(places) >= MOST_PLACES:
+            return topic, OTHER_PLACES
+        if self._listed[kind] >= MOST_LISTED:
+            return "", OTHER_PLACES
+        self._listed[kind] += 1
+        self._places.setdefault((kind, topic), places).add(place)
+        return topic, place
 
 
 class Losses:
@@ -53,7 +77,7 @@ class Losses:
         # their hashes alone, because there may be one for each message
         self._met: set[int] = set()
         self._listed: list[Loss] = []
-        self._places: Counter[tuple[SkipCause, str]] = Counter()
+        self._listing = Listing()
         self._others: dict[tuple[SkipCause, str], Loss] = {}
         self._new: list[Loss] = []
 
@@ -63,12 +87,12 @@ class Losses:
             return
         self._met.add(hash(loss))
         self._new.append(loss)
-        kind = loss.cause, loss.topic
-        self._places[kind] += 1
-        if self._places[kind] <= MOST_PLACES:
+        topic, place = self._listing.at(loss.cause, loss.topic, f"{loss.place}: {loss.detail}")
+        if place != OTHER_PLACES:
             self._listed.append(loss)
             return
-        others = self._others.get(kind, replace(loss, place=OTHER_PLACES, messages=0))
+        kind = loss.cause, topic
+        others = self._others.get(kind, replace(loss, topic=topic, place=OTHER_PLACES, messages=0))
         is_known = others.messages is not None and loss.messages is not None
         messages = (others.messages or 0) + (loss.messages or 0) if is_known else None
         self._others[kind] = replace(others, messages=messages)
@@ -80,7 +104,7 @@ class Losses:
 
     @property
     def all(self) -> tuple[Loss, ...]:
-        """All that were met so far; of each cause and topic, those at other places than the first few as one."""
+        """All that were met so far; those at other places than the first few are added up."""
         return (*self._listed, *self._others.values())
 
 

@@ -37,7 +37,7 @@ _KILLER = textwrap.dedent("""
             return function(*arguments, **options)
         return call
 
-    for name in ("replace", "rename", "unlink", "remove", "fsync"):
+    for name in ("replace", "rename", "link", "unlink", "remove", "fsync"):
         setattr(os, name, counted(getattr(os, name)))
     from replay.cli import main
     sys.exit(main(sys.argv[1:]))

@@ -7,8 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
+from replay.errors import BadMessage
+from replay.footprint import MemoryLimit
 from tests.bags import write_bare_db3, write_mcap, write_rosbag1, write_rosbag2
+from tests.outputs import maps
 from tests.program import Program
 from tests.runs import flat_map, in_log_order, seen, two_robots, updated
 
@@ -39,6 +43,30 @@ def test_unknown_margins_do_not_count(replay: Program, tmp_path: Path) -> None:
     padded = Grid(np.pad(grid.cells, 1500, constant_values=-1), grid.resolution_m)
     ran = replay.merge(write_mcap(tmp_path / "run.mcap", [seen("r1", 0.0, padded)]), "--max-memory", "20MB")
     assert ran.report["skipped"] == {}
+
+
+@pytest.mark.parametrize("start", [(), ("--start", "1.5")])
+def test_a_map_that_an_update_makes_need_more(replay: Program, tmp_path: Path, start: tuple[str, ...]) -> None:
+    """Hardly anything is known of it at first."""
+    cells = np.full((1500, 1500), -1, np.int8)
+    room = flat_map("r1").cells
+    cells[: room.shape[0], : room.shape[1]] = room
+    messages = [
+        seen("r1", 0.0, Grid(cells, flat_map("r1").resolution_m)),
+        updated("r1", 1.0, 0, 0, huge().cells),
+        updated("r1", 2.0, 0, 0, np.full((2, 2), 100, np.int8)),
+    ]
+    ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages), "--max-memory", "20MB", *start)
+    assert ran.status == 0, ran.err
+    assert ran.report["skipped"] == ({} if start else {"over_memory": 1})
+    assert maps(ran.mcap)[-1].grid.cells.size < 2 * room.size
+
+
+def test_what_is_unknown_takes_its_bytes() -> None:
+    limit = MemoryLimit(20_000_000, MergeConfig())
+    limit.refuse_over(Grid(np.full((4000, 4000), -1, np.int8), 0.05))
+    with pytest.raises(BadMessage, match=r"5000 × 5000 cells of .* needs about 25\.0 MB"):
+        limit.refuse_over(Grid(np.full((5000, 5000), -1, np.int8), 0.05))
 
 
 def test_an_update_of_a_map_that_was_not_taken_is_not_put_on_the_one_before(replay: Program, tmp_path: Path) -> None:

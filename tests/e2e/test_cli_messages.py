@@ -129,7 +129,12 @@ class TestBadMessages:
     CAUSES = tuple(bad_messages("r1", 0.0))
 
     def test_every_cause_is_tested(self) -> None:
-        elsewhere = {SkipCause.UPDATE_BEFORE_GRID, SkipCause.UPDATE_OUTSIDE_GRID, SkipCause.BAD_TRANSFORM}
+        elsewhere = {
+            SkipCause.UPDATE_BEFORE_GRID,
+            SkipCause.UPDATE_OUTSIDE_GRID,
+            SkipCause.BAD_TIME,
+            SkipCause.BAD_TRANSFORM,
+        }
         of_recordings = {
             SkipCause.OVER_MEMORY,
             SkipCause.ENDS_EARLY,

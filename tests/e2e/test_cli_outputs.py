@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -88,6 +90,77 @@ def test_a_failed_run_leaves_what_was_there(replay: Program, two: Path) -> None:
     assert names(replay.folder) == ["out.json", "out.mcap"]
 
 
+class TestARunThatFailsAtTheEndLeavesWhatWasThere:
+    @pytest.fixture(params=[("out.json", "out.mcap", "out.rrd"), ("out.json", "out.mcap"), ("out.json",), ()], ids=len)
+    def there(self, request: pytest.FixtureRequest, tmp_path: Path) -> dict[str, bytes]:
+        for name in request.param:
+            (tmp_path / name).write_text(f"the {name} of an earlier run")
+        return contents(tmp_path)
+
+    @pytest.mark.parametrize("name", ["out.mcap", "out.rrd", "out.json"])
+    def test_because_a_file_is_gone(
+        self, replay: Program, two: Path, monkeypatch: pytest.MonkeyPatch, there: dict[str, bytes], name: str
+    ) -> None:
+        def drained(*arguments: Any) -> Finished:
+            found = drain(*arguments)
+            (replay.folder / f"{name}.partial").unlink()
+            return found
+
+        monkeypatch.setattr("replay.pipeline.drain", drained)
+        ran = replay("merge", two, "-o", replay.folder / "out.mcap", "--force", "--images", "none")
+        assert ran.status == 3
+        assert f"{name}.partial was removed or replaced while it was written" in ran.err.splitlines()[-1]
+        assert contents(replay.folder) == there
+
+    @pytest.mark.parametrize("has_links", [True, False])
+    @pytest.mark.parametrize("name", ["out.mcap", "out.rrd", "out.json"])
+    def test_because_a_file_cannot_have_its_name(
+        self,
+        replay: Program,
+        two: Path,
+        monkeypatch: pytest.MonkeyPatch,
+        there: dict[str, bytes],
+        name: str,
+        has_links: bool,
+    ) -> None:
+        refuse_to(monkeypatch, "replace", lambda _, target: Path(target).name == name and Path(_).suffix == ".partial")
+        refuse_to(monkeypatch, "link", lambda *_: not has_links)
+        ran = replay("merge", two, "-o", replay.folder / "out.mcap", "--force", "--images", "none")
+        assert ran.status == 3
+        assert ran.err.splitlines()[-1].endswith(f"{name}: cannot be written: Operation not permitted")
+        assert contents(replay.folder) == there
+
+    @pytest.mark.parametrize("name", ["out.mcap", "out.rrd", "out.json"])
+    def test_because_an_older_file_cannot_be_moved(
+        self, replay: Program, two: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+    ) -> None:
+        """As in a folder with the sticky bit, of a file that is somebody else's."""
+        for each in ("out.json", "out.mcap", "out.rrd"):
+            (tmp_path / each).write_text(f"the {each} of an earlier run")
+        there = contents(tmp_path)
+        refuse_to(monkeypatch, "replace", lambda old, new: name in {Path(old).name, Path(new).name})
+        refuse_to(monkeypatch, "link", lambda old, _: Path(old).name == name)
+        ran = replay("merge", two, "-o", tmp_path / "out.mcap", "--force", "--images", "none")
+        assert ran.status == 3
+        assert contents(tmp_path) == there
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {each.name: each.read_bytes() for each in folder.iterdir()}
+
+
+def refuse_to(monkeypatch: pytest.MonkeyPatch, call: str, when: Callable[..., bool]) -> None:
+    """Let a call of the system fail when it is given this."""
+    before = getattr(os, call)
+
+    def called(*arguments: Any, **options: Any) -> None:
+        if when(*arguments):
+            raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+        before(*arguments, **options)
+
+    monkeypatch.setattr(os, call, called)
+
+
 class TestInputsAreNeverWritten:
     def test_by_name(self, replay: Program, two: Path, tmp_path: Path) -> None:
         shutil.copy(two, tmp_path / "run.mcap")
@@ -105,7 +178,18 @@ class TestInputsAreNeverWritten:
             assert "is an input" in replay("merge", run, "-o", output, "--no-rrd", "--force").error
 
     @pytest.mark.parametrize("link", [Path.symlink_to, Path.hardlink_to])
-    @pytest.mark.parametrize("name", ["out.mcap", "out.rrd", "out.json", "out.mcap.partial", "out.json.partial"])
+    @pytest.mark.parametrize(
+        "name",
+        [
+            "out.mcap",
+            "out.rrd",
+            "out.json",
+            "out.mcap.partial",
+            "out.json.partial",
+            "out.json.replaced",
+            "out.mcap.recovering",
+        ],
+    )
     def test_through_any_link(
         self, replay: Program, two: Path, tmp_path: Path, name: str, link: Callable[[Path, Path], None]
     ) -> None:

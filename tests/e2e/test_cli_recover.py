@@ -14,6 +14,7 @@ from rerun.chunk import McapReader
 from rosbags.highlevel import AnyReader
 
 from replay.codec import ros2_message_definition
+from replay.sinks.mcap_copy import McapCopy
 from replay.sinks.partial_file import PartialFile
 from replay.sources.base import GRID_TYPE
 from tests.bags import START, chunks
@@ -193,7 +194,7 @@ class TestRefused:
     ) -> None:
         run = recorded(tmp_path / "run.mcap")
         kept = run.read_bytes()
-        for name in ("out.mcap", "out.json", "out.mcap.recovering"):
+        for name in ("out.mcap", "out.json", "out.mcap.recovering", "out.json.partial", "out.json.replaced"):
             link(tmp_path / name, run)
             ran = replay("recover", "run.mcap", "-o", "out.mcap", "--force")
             assert ran.status == 2
@@ -210,6 +211,45 @@ class TestRefused:
         assert ran.status == 2
         assert "a run is still writing it" in ran.error
         file.discard()
+
+
+class TestOneOutputAtATime:
+    """Runs and recoveries of one name keep each other out."""
+
+    def test_not_while_a_run_writes_it(self, replay: Program, tmp_path: Path) -> None:
+        recorded(tmp_path / "run.mcap")
+        file = PartialFile.claimed(tmp_path / "out.mcap")
+        ran = replay("recover", "run.mcap", "-o", "out.mcap")
+        file.discard()
+        assert ran.status == 3
+        assert "another run is writing it now" in ran.error
+        assert [each.name for each in tmp_path.iterdir()] == ["run.mcap"]
+
+    @pytest.mark.parametrize("name", ["run.mcap", "out.mcap.partial"])
+    def test_no_run_while_it_is_recovered(
+        self, replay: Program, two: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+    ) -> None:
+        recorded(tmp_path / name)
+        finish, runs = McapCopy.finish, []
+
+        def finished(copy: McapCopy) -> None:
+            runs.append(replay.merge(two))
+            finish(copy)
+
+        monkeypatch.setattr(McapCopy, "finish", finished)
+        assert replay("recover", name, "-o", "out.mcap").status == 0
+        assert [each.status for each in runs] == [3]
+        assert "out.mcap: another run is writing it now" in runs[0].err.splitlines()[-1]
+        assert sorted(each.name for each in tmp_path.iterdir()) == sorted(["out.mcap", name])
+
+    @pytest.mark.parametrize("left", ["out.mcap.recovering", "out.mcap.partial"])
+    @pytest.mark.parametrize("command", ["merge", "recover"])
+    def test_what_a_killed_one_left_is_removed(self, replay: Program, two: Path, left: str, command: str) -> None:
+        (replay.folder / left).write_text("of an earlier run")
+        ran = replay(command, two, "-o", "out.mcap")
+        assert ran.status == 0
+        assert f"an earlier run was cut off and left {left}; it is removed" in ran.out + ran.err
+        assert left not in {each.name for each in replay.folder.iterdir()}
 
 
 def test_a_message_whose_channel_is_lost_is_counted(replay: Program, tmp_path: Path) -> None:

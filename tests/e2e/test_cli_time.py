@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -262,3 +263,14 @@ class TestLateAndEarly:
         assert not raw(ran.mcap, "/merged/map")
         assert not raw(ran.mcap, "/tf")
         assert is_right(ran.robots["r3"]["component_from_map"], reference_from("r3", "r2"))
+
+
+@pytest.mark.parametrize("log_ns", [4_200_000_000 * SECOND, 2**64 - 1])
+@pytest.mark.parametrize("clock", ["header", "log"])
+def test_one_message_of_no_time_ends_no_run(replay: Program, tmp_path: Path, log_ns: int, clock: str) -> None:
+    *messages, last = two_robots()
+    odd = replace(last, log_time_ns=log_ns, fields={**last.fields, "stamp_ns": 0})
+    ran = replay.merge(write_mcap(tmp_path / "run.mcap", [*messages, last, odd]), "--clock", clock)
+    assert ran.status == 0, ran.err
+    assert ran.report["skipped"] == {"bad_time": 1}
+    assert ran.statuses == {"r1": "reference", "r2": "merged"}

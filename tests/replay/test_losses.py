@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from replay.skip_cause import SkipCause
-from replay.sources.losses import MOST_PLACES, OTHER_PLACES, Loss, Losses, summed_up
+from replay.sources.losses import MOST_LISTED, MOST_PLACES, OTHER_PLACES, Loss, Losses, summed_up
 
 
 def damaged(number: int, topic: str = "/tf", messages: int | None = 1) -> Loss:
@@ -33,6 +35,17 @@ def test_of_very_many_the_first_are_listed_and_the_others_added_up() -> None:
     assert summed_up(("run", loss) for loss in losses.all).startswith(
         "lost are 501 messages (damaged), first run, mess"
     )
+
+
+def test_of_very_many_topics_as_well() -> None:
+    losses = Losses()
+    for number in range(5000):
+        losses.add(damaged(number, f"/{number}"))
+    losses.add(replace(damaged(1), cause=SkipCause.UNKNOWN_TYPE))
+    *listed, other_cause, others = losses.all
+    assert listed == [damaged(number, f"/{number}") for number in range(MOST_LISTED)]
+    assert other_cause.cause == SkipCause.UNKNOWN_TYPE
+    assert (others.place, others.messages, others.topic) == (OTHER_PLACES, 5000 - MOST_LISTED, "")
 
 
 def test_if_not_all_numbers_are_known_the_sum_is_not() -> None:

@@ -21,7 +21,7 @@ from replay.errors import BadMessage
 from replay.events import Noted, Report, RobotInput, Skipped
 from replay.report import ReportBuilder
 from replay.skip_cause import SkipCause
-from replay.sources.losses import MOST_PLACES, OTHER_PLACES
+from replay.sources.losses import MOST_LISTED, MOST_PLACES, OTHER_PLACES
 from tests.runs import bare_room, begun_anew, flat_map, is_right, reference_from
 
 ROBOTS = ("r1", "r2", "r3")
@@ -174,6 +174,20 @@ def test_of_very_many_places_the_first_are_listed() -> None:
         ("run.db3", OTHER_PLACES, 500 - MOST_PLACES, f"detail {MOST_PLACES}"),
         ("other.db3", "message 0", 1, "detail 0"),
     ]
+
+
+def test_of_very_many_topics_the_first_are_listed_and_the_others_added_up() -> None:
+    """What it lists is written at each tick, and does not grow with what a recording says."""
+    report = builder()
+    for number in range(5000):
+        topic = f"/r{number}/map"
+        report.skip(Skipped("", topic, number, SkipCause.UNKNOWN_TYPE, "another", "run.mcap", f"topic {topic}"))
+    found = report.build(None, Merger(ROBOTS).result, [INPUT])
+    validate(found)
+    assert found["skipped"] == {"unknown_type": 5000}
+    *listed, others = found["skipped_at"]
+    assert [each["topic"] for each in listed] == [f"/r{number}/map" for number in range(MOST_LISTED)]
+    assert (others["topic"], others["place"], others["messages"]) == ("", OTHER_PLACES, 5000 - MOST_LISTED)
 
 
 def test_what_was_believed() -> None:

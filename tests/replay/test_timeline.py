@@ -10,6 +10,8 @@ from mapmerge.grid import Grid
 from replay.arrivals import Feed, Tally, Window
 from replay.errors import InputError
 from replay.events import Clock, Noted, Skipped
+from replay.sources.base import TF_TYPE
+from replay.stamps import LAST_NS
 from replay.timeline import _MOST_HELD, Tick, Transforms, ticks
 from tests.bags import SECOND, START, Recorded, as_cdr
 from tests.fakes import FakeSource
@@ -146,6 +148,31 @@ class TestStamps:
         assert (tally.bad_stamps, tally.late, tally.messages) == (1, 0, 8)
         # it is used all the same, so that nothing is lost
         run(replace(recorded, leads_ns={"/r1/map": -SECOND}), strict=True)
+
+    @pytest.mark.parametrize("log_ns", [LAST_NS + 1, 2**63 + 5, 2**64 - 1])
+    @pytest.mark.parametrize("clock", ["header", "log"])
+    def test_a_log_time_that_no_stamp_can_hold_is_not_believed(self, log_ns: int, clock: Clock) -> None:
+        """It comes last in the recording, and would replace maps that are newer."""
+        one, two, three = (mapped("r1", 10.0 * index, index) for index in range(3))
+        odd = Recorded(three.topic, three.msgtype, log_ns, {**three.fields, "stamp_ns": 0})
+        found, (tally,) = run(feed(one, two, odd, odd, clock=clock))
+        assert sorted(map(str, told(found))) == ["(0.0, {'r1': 0})", "(10.0, {'r1': 1})", "bad_time", "bad_time"]
+        assert (tally.bad_stamps, tally.late) == (0, 0)
+
+    def test_nor_is_that_of_what_cannot_be_decoded_or_is_a_transform(self) -> None:
+        one, two = (mapped("r1", 10.0 * index, index) for index in range(2))
+        odd = Recorded(two.topic, two.msgtype, 2**64 - 1, two.fields, lost_bytes=9)
+        found, _ = run(feed(one, two, odd))
+        assert sorted(map(str, told(found))) == ["(0.0, {'r1': 0})", "(10.0, {'r1': 1})", "undecodable"]
+        moved = Recorded("/tf", TF_TYPE, 2**64 - 1, {"links": [link("map", "base")]})
+        found, _ = run(transforms(linked(1.0, link("map", "odom")), moved))
+        assert sorted(told(found)) == ["1: odom", "bad_time"]
+
+    def test_a_whole_header_is_believed_whatever_the_log_time(self) -> None:
+        one, two = (mapped("r1", 10.0 * index, index) for index in range(2))
+        found, (tally,) = run(feed(one, Recorded(two.topic, two.msgtype, 2**64 - 1, two.fields)))
+        assert told(found) == [(0.0, {"r1": 0}), (10.0, {"r1": 1})]
+        assert (tally.bad_stamps, tally.late) == (0, 0)
 
     def test_a_clock_that_jumps_and_stays_is_followed(self) -> None:
         stamps = [10.0 * index + (1e6 if index >= 4 else 0.0) for index in range(10)]
