@@ -142,7 +142,7 @@ def _recover(options: argparse.Namespace) -> int:
     damaged, output = recovery_paths(options)
     found = recover(damaged, output, force=options.force)
     for line in found.lines():
-        print(f"replay: {line}", file=sys.stderr)
+        print(f"replay: {plain(line)}", file=sys.stderr)
     return EXIT_DONE
 
 

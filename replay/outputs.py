@@ -9,7 +9,7 @@ from pathlib import Path
 from replay.errors import OutputError, UsageError
 from replay.options import OutputOptions
 from replay.sinks import all_output_paths, output_paths, refuse_existing
-from replay.sinks.partial_file import partial_name
+from replay.sinks.partial_file import partial_name, recovering_name
 
 _Identity = tuple[int, int]
 
@@ -23,7 +23,8 @@ def refuse_outputs(outputs: OutputOptions, inputs: Sequence[Path]) -> None:
         With the reason.
     """
     finals = all_output_paths(outputs).values()
-    refuse_inputs([name for path in finals for name in (path, partial_name(path))], inputs)
+    names = [name for path in finals for name in (path, partial_name(path))]
+    refuse_inputs([*names, recovering_name(outputs.mcap)], inputs)
     refuse_existing(outputs)
     for path in output_paths(outputs).values():
         refuse_unwritable(path)

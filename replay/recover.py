@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import stat
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from replay.errors import InputError
 from replay.interrupts import held_off
-from replay.mcap_walk import Walk
+from replay.mcap_salvage import Salvage
 from replay.options import OutputOptions
 from replay.outputs import refuse_inputs, refuse_unwritable
-from replay.sinks import all_output_paths, refuse_existing
+from replay.sinks import all_output_paths, claim, refuse_existing, remove_left_over
 from replay.sinks.file_lock import try_lock
 from replay.sinks.mcap_copy import McapCopy
-from replay.sinks.partial_file import PartialFile
+from replay.sinks.partial_file import PartialFile, partial_name, recovering_name
 from replay.sinks.publication import publish
 from replay.sources.boundary import translated
 from replay.sources.mcap_records import MAGIC, RecordFile, written_bytes
@@ -39,6 +40,8 @@ class Recovery:
         Whether the file was not cut off.
     left_out
         What is not in the new file, and why.
+    removed
+        What is said of files under temporary names that were in the way.
     """
 
     damaged: Path
@@ -47,9 +50,11 @@ class Recovery:
     until_ns: int
     is_whole: bool
     left_out: tuple[str, ...]
+    removed: tuple[str, ...] = ()
 
     def lines(self) -> Iterator[str]:
         """Yield what is said at the terminal."""
+        yield from self.removed
         for what in self.left_out[:_LEFT_OUT_NAMED]:
             yield f"left out: {what}"
         if len(self.left_out) > _LEFT_OUT_NAMED:
@@ -80,30 +85,41 @@ def recover(damaged: Path, output: Path, *, force: bool = False) -> Recovery:
         If nothing can be recovered, or the new file cannot be written.
     """
     options = OutputOptions(output, force=force)
-    refuse_inputs([*all_output_paths(options).values(), _temporary(output)], [damaged])
+    refuse_inputs([*all_output_paths(options).values(), recovering_name(output)], [damaged])
     refuse_existing(options)
     refuse_unwritable(output)
+    removed: list[str] = []
     with ExitStack() as stack:
-        walk = Walk(stack.enter_context(_opened(damaged)))
-        copy = stack.enter_context(_copied(PartialFile(output, _temporary(output))))
-        walk.to(copy)
+        salvage = Salvage(stack.enter_context(_opened(damaged)))
+        copy = stack.enter_context(_copied(_new_file(output, damaged, removed.append), removed.append))
+        with translated(damaged, (OSError,)):
+            salvage.to(copy)
         copy.finish()
         with held_off():
             refuse_existing(options)
             publish([copy], list(all_output_paths(options).values()))
-    return Recovery(damaged, output, walk.messages, walk.until_ns, walk.is_whole, tuple(walk.left_out))
+    return Recovery(
+        damaged, output, salvage.messages, salvage.until_ns, salvage.is_whole, salvage.left_out, tuple(removed)
+    )
 
 
-def _temporary(output: Path) -> Path:
-    """Return a temporary name that is not the one of runs, which is what is recovered."""
-    return output.with_name(f"{output.name}.recovering")
+def _new_file(output: Path, damaged: Path, say: Callable[[str], object]) -> PartialFile:
+    """Return the new file under the temporary name that runs use, which keeps them from writing at the same time.
+
+    If that is what is recovered, its own lock keeps them away, and the new file has a name of its own.
+    """
+    usual, other = PartialFile(output), PartialFile(output, recovering_name(output))
+    if partial_name(output).exists() and partial_name(output).samefile(damaged):
+        return other
+    remove_left_over(other, say)
+    return usual
 
 
 @contextmanager
-def _copied(file: PartialFile) -> Iterator[McapCopy]:
+def _copied(file: PartialFile, say: Callable[[str], object]) -> Iterator[McapCopy]:
     """Open a new MCAP; it is removed unless it has its final name at the end."""
     try:
-        file.claim()
+        claim(file, say)
         copy = McapCopy(file)
         try:
             yield copy
@@ -117,6 +133,10 @@ def _copied(file: PartialFile) -> Iterator[McapCopy]:
 def _opened(path: Path) -> Iterator[RecordFile]:
     with ExitStack() as stack:
         with translated(path):
+            # before it is opened: that would wait for whoever writes to a pipe
+            mode = path.stat().st_mode
+            if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+                raise InputError(f"{path}: this is no regular file; expected an MCAP that was cut off or damaged")
             file = stack.enter_context(path.open("rb"))
             size = path.stat().st_size
             is_free = try_lock(file.fileno(), shared=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
@@ -12,7 +12,7 @@ from replay.errors import UsageError
 from replay.interrupts import held_off
 from replay.options import OutputOptions
 from replay.sinks.base import Sink
-from replay.sinks.partial_file import PartialFile, partial_name
+from replay.sinks.partial_file import PartialFile, recovering_name
 from replay.sinks.publication import publish
 
 __all__ = ["SINKS", "Sink", "all_output_paths", "open_sinks", "output_paths", "refuse_existing"]
@@ -59,8 +59,10 @@ def open_sinks(
     sinks: list[Sink] = []
     try:
         for file in files.values():
-            _claim(file, say)
-        _remove_left_over(set(all_output_paths(options).values()) - {file.path for file in files.values()}, say)
+            claim(file, say)
+        unwritten = set(all_output_paths(options).values()) - {file.path for file in files.values()}
+        for file in (*map(PartialFile, unwritten), PartialFile(options.mcap, recovering_name(options.mcap))):
+            remove_left_over(file, say)
         refuse_existing(options)  # once more: another run may have published between the first time and the claim
         for name, file in files.items():
             module, _, attribute = SINKS[name].partition(":")
@@ -83,16 +85,15 @@ def open_sinks(
         raise
 
 
-def _claim(file: PartialFile, say: Callable[[str], object]) -> None:
+def claim(file: PartialFile, say: Callable[[str], object]) -> None:
+    """Claim a file, and say what an earlier run left under its temporary name."""
     file.claim()
     if file.replaced_bytes:
         say(f"an earlier run was cut off and left {file.partial}; it is removed")
 
 
-def _remove_left_over(unwritten: Collection[Path], say: Callable[[str], object]) -> None:
-    """Remove what an earlier run left of files that this one does not write."""
-    for path in unwritten:
-        if partial_name(path).exists():
-            file = PartialFile(path)
-            _claim(file, say)
-            file.discard()
+def remove_left_over(file: PartialFile, say: Callable[[str], object]) -> None:
+    """Remove what an earlier run left of a file that this one does not write."""
+    if file.partial.exists():
+        claim(file, say)
+        file.discard()

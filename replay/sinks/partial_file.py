@@ -26,6 +26,11 @@ def partial_name(path: Path) -> Path:
     return path.with_name(f"{path.name}.partial")
 
 
+def recovering_name(path: Path) -> Path:
+    """Return the temporary name of a file that is recovered from one under that other temporary name."""
+    return path.with_name(f"{path.name}.recovering")
+
+
 class PartialFile:
     """Names a file while it is written, and renames it when it is whole.
 
