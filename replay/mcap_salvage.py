@@ -82,7 +82,7 @@ class Salvage:
         # what is of an unknown type can be copied all the same
         losses = [loss for loss in found.losses if loss.cause != SkipCause.UNKNOWN_TYPE]
         self.is_whole = all(loss.cause != SkipCause.ENDS_EARLY for loss in losses)
-        self._left_out += [self._in_words(loss, found) for loss in losses]
+        self._left_out += [_in_words(loss) for loss in losses if loss.cause != SkipCause.ENDS_EARLY]
         copy.start(self._header())
         self._describe(found, copy)
         walk = Walk(self._file, summary.places if summary else ())
@@ -92,6 +92,8 @@ class Salvage:
             self._take_content(cut_chunk_content(self._file, found.cut_chunk), copy)
         if not losses:
             self._left_out += map(_costless, walk.gaps)
+        if not self.is_whole:
+            self._left_out += self._cut_off(walk)
         self._left_out += self._lost_of_channels(found)
         if not self.messages:
             first = f": left out is {self._left_out[0]}" if self._left_out else ""
@@ -228,10 +230,12 @@ class Salvage:
             self._left_out.append(f"{place}: it cannot be read ({type(error).__name__}: {found})")
             return None
 
-    def _in_words(self, loss: Loss, found: Scan) -> str:
-        if loss.cause == SkipCause.ENDS_EARLY and found.cut_chunk is not None:
-            return f"the end of the chunk at byte {found.cut_chunk}, at which the file was cut off"
-        return f"{loss.place}: {loss.detail.replace(MORE_ALLOWED, '')}"
+    def _cut_off(self, walk: Walk) -> Iterator[str]:
+        """Yield what there is of the record at which the file was cut off, if that is not between two records."""
+        if walk.cut_chunk is not None:
+            yield f"the end of the chunk at byte {walk.cut_chunk}, at which the file was cut off"
+        elif walk.ends_early is not None and walk.ends_early < self._file.size:
+            yield f"the last {counted(self._file.size - walk.ends_early, 'byte')}, which are no whole record"
 
     def _lost_of_channels(self, found: Scan) -> Iterator[str]:
         for key, count in sorted(self._lost.items()):
@@ -246,6 +250,10 @@ def _of_damage() -> tuple[type[Exception], ...]:
     """Return what the mcap package raises where bytes are not what is expected."""
     others = (OSError, MemoryError)
     return tuple(each for each in (*foreign_errors(), *OF_LIBRARIES) if each not in others)
+
+
+def _in_words(loss: Loss) -> str:
+    return f"{loss.place}: {loss.detail.replace(MORE_ALLOWED, '')}"
 
 
 def _costless(gap: Gap) -> str:
