@@ -166,7 +166,8 @@ def statistics_between(file: RecordFile, data_end: int, footer: int) -> Statisti
 
 
 def _unsound() -> tuple[type[Exception], ...]:
-    return (BadPart, *(each for each in foreign_errors() if not issubclass(each, OSError)))
+    """Return what is raised where a summary is not as it should be; the machine's own troubles are not."""
+    return (BadPart, *(each for each in foreign_errors() if not issubclass(each, (OSError, MemoryError))))
 
 
 def _summary_section(file: RecordFile) -> tuple[bytes, bool] | None:
