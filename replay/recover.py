@@ -10,7 +10,7 @@ from pathlib import Path
 
 from replay.errors import InputError
 from replay.interrupts import held_off
-from replay.mcap_walk import Walk
+from replay.mcap_salvage import Salvage
 from replay.options import OutputOptions
 from replay.outputs import refuse_inputs, refuse_unwritable
 from replay.sinks import all_output_paths, claim, refuse_existing, remove_left_over, reserved_paths
@@ -92,19 +92,21 @@ def recover(damaged: Path, output: Path, *, force: bool = False) -> Recovery:
     refuse_unwritable(output)
     removed: list[str] = []
     with ExitStack() as stack:
-        walk = Walk(stack.enter_context(_opened(damaged)))
+        salvage = Salvage(stack.enter_context(_opened(damaged)))
         # under the name of runs, so that none writes the same output
         file = PartialFile(output, recovering_name(output) if is_partial else None)
         copy = stack.enter_context(_copied(file, removed.append))
         if not is_partial:
             remove_left_over([PartialFile(output, recovering_name(output))], removed.append)
-        walk.to(copy)
+        with translated(damaged, (OSError,)):
+            salvage.to(copy)
         copy.finish()
         with held_off():
             refuse_existing(options)
             publish([copy], [file], list(all_output_paths(options).values()))
-    left_out = tuple(walk.left_out)
-    return Recovery(damaged, output, walk.messages, walk.until_ns, walk.is_whole, left_out, tuple(removed))
+    return Recovery(
+        damaged, output, salvage.messages, salvage.until_ns, salvage.is_whole, salvage.left_out, tuple(removed)
+    )
 
 
 def _recovers_partial(output: Path, damaged: Path) -> bool:
@@ -132,8 +134,10 @@ def _copied(file: PartialFile, say: Callable[[str], object]) -> Iterator[McapCop
 def _opened(path: Path) -> Iterator[RecordFile]:
     with ExitStack() as stack:
         with translated(path):
-            if not stat.S_ISREG(path.stat().st_mode):  # to open one may wait for ever
-                raise InputError(f"{path}: this is no regular file; expected an MCAP that was cut off")
+            # before it is opened: that would wait for whoever writes to a pipe
+            mode = path.stat().st_mode
+            if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+                raise InputError(f"{path}: this is no regular file; expected an MCAP that was cut off or damaged")
             file = stack.enter_context(path.open("rb"))
             size = path.stat().st_size
             is_free = try_lock(file.fileno(), shared=True)

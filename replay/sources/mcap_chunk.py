@@ -12,10 +12,11 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator
+from io import BytesIO
 from typing import NamedTuple
 
 from replay.skip_cause import SkipCause
-from replay.sources.mcap_records import CHUNK, MESSAGE, MESSAGE_HEAD, RECORD, Record, RecordFile
+from replay.sources.mcap_records import CHANNEL, CHUNK, MESSAGE, MESSAGE_HEAD, RECORD, SCHEMA, Record, RecordFile
 from replay.sources.memory import over_memory
 
 _HEAD = struct.Struct("<QQQII")
@@ -85,18 +86,18 @@ def chunk_content(file: RecordFile, start: int) -> tuple[bytes, bool]:
         raise BadPart(SkipCause.DAMAGED, "no chunk is there")
     if record.end - record.start > file.most_bytes:
         raise _too_large(file)
-    content = file.content(record)
-    head = chunk_head(content)
-    if head is None or head.head_bytes + head.data_bytes != len(content):
-        raise BadPart(SkipCause.DAMAGED, f"the lengths in it do not fit its {len(content)} bytes")
+    found = file.head_at(start, CHUNK_HEAD_BYTES)
+    head = chunk_head(found[1]) if found else None
+    if head is None or head.head_bytes + head.data_bytes != record.end - record.content:
+        raise BadPart(SkipCause.DAMAGED, f"the lengths in it do not fit its {record.end - record.content} bytes")
+    file.file.seek(record.content + head.head_bytes)
     # More than it should have is wrong as soon as it is seen: little data may grow to very much.
     most_bytes = min(head.size, file.most_bytes)
-    pieces = list(_decompressed(head.compression, content[head.head_bytes :], most_bytes))
-    if head.compression and sum(map(len, pieces)) > most_bytes:
+    plain = _joined(_decompressed(head.compression, file.file.read(head.data_bytes), most_bytes))
+    if head.compression and len(plain) > most_bytes:
         if most_bytes == file.most_bytes:
             raise _too_large(file)
         raise BadPart(SkipCause.DAMAGED, f"it has more than {head.size} bytes, which it should have")
-    plain = b"".join(pieces)
     if head.crc not in {0, zlib.crc32(plain)}:
         raise BadPart(SkipCause.WRONG_CHECKSUM, "its checksum (CRC) is wrong")
     if len(plain) != head.size:
@@ -119,13 +120,29 @@ def cut_chunk_content(file: RecordFile, start: int) -> bytes:
     file.file.seek(found[0].content + head.head_bytes)
     # without the zeros at the end of the file, which a decompressor would take for data
     data = file.file.read(max(0, min(file.written - file.file.tell(), file.most_bytes)))
-    plain = b"".join(_decompressed(head.compression, data, file.most_bytes))
+    plain = _joined(_decompressed(head.compression, data, file.most_bytes))
     end = 0
     for record in _records(plain):
         if record.end > len(plain):
             break
         end = record.end
     return plain[:end]
+
+
+def describes(content: bytes) -> bool:
+    """Check all records in a decompressed chunk, none of which is kept; tell whether one is a schema or a channel.
+
+    There may be one for each few bytes of the chunk, so that a list of them would need many times its memory.
+
+    Raises
+    ------
+    BadPart
+        If they do not fit it.
+    """
+    found = False
+    for record in inner_records(content):
+        found |= record.opcode in {SCHEMA, CHANNEL}
+    return found
 
 
 def inner_records(content: bytes) -> Iterator[Record]:
@@ -158,6 +175,21 @@ def _records(content: bytes) -> Iterator[Record]:
         start = inner + length
 
 
+def _joined(pieces: Iterator[bytes]) -> bytes:
+    """Return pieces as one, in the memory of one: each is let go of before the next one comes."""
+    first = next(pieces, b"")
+    second = next(pieces, None)
+    if second is None:
+        return first
+    joined = BytesIO()
+    joined.write(first)
+    joined.write(second)
+    del first, second
+    for piece in pieces:
+        joined.write(piece)
+    return joined.getvalue()
+
+
 def _too_large(file: RecordFile) -> BadPart:
     return BadPart(SkipCause.OVER_MEMORY, over_memory(file.most_bytes))
 
@@ -183,6 +215,9 @@ def _decompressed(compression: bytes, data: bytes, most_bytes: int) -> Iterator[
     # RuntimeError is lz4's
     except (ZstdError, RuntimeError) as error:
         found = " ".join(str(error).split())
+        if "allocation" in found.lower():
+            # which says nothing about the recording
+            raise MemoryError(found) from error
         raise BadPart(SkipCause.DAMAGED, f"it cannot be decompressed ({found})") from error
 
 

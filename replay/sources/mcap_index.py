@@ -103,23 +103,29 @@ class Summary:
         return sorted({chunk.chunk_start_offset for chunk in self.chunks} | set(ends))
 
 
-def read_summary(file: RecordFile) -> Summary | None:
-    """Return the summary of a file; None if it has none, or one that is not sound."""
+def read_summary(file: RecordFile, *, keeps_records: bool = False) -> Summary | None:
+    """Return the summary of a file; None if it has none, or one that is not sound.
+
+    Parameters
+    ----------
+    keeps_records
+        Whether its table keeps the records of schemas and channels.
+    """
     try:
-        return _summary(file)
+        return _summary(file, ChannelTable(keeps_records=keeps_records))
     except _unsound():
         # what it should say is found by a pass through the file
         return None
 
 
-def _summary(file: RecordFile) -> Summary | None:
+def _summary(file: RecordFile, table: ChannelTable) -> Summary | None:
     from mcap import records
 
     found = _summary_section(file)
     if found is None:
         return None
     section, is_checked = found
-    table, chunks = ChannelTable(), []
+    chunks = []
     statistics: Statistics | None = None
     for record in inner_records(section):
         content = section[record.content : record.end]
@@ -160,7 +166,8 @@ def statistics_between(file: RecordFile, data_end: int, footer: int) -> Statisti
 
 
 def _unsound() -> tuple[type[Exception], ...]:
-    return (BadPart, *(each for each in foreign_errors() if not issubclass(each, OSError)))
+    """Return what is raised where a summary is not as it should be; the machine's own troubles are not."""
+    return (BadPart, *(each for each in foreign_errors() if not issubclass(each, (OSError, MemoryError))))
 
 
 def _summary_section(file: RecordFile) -> tuple[bytes, bool] | None:

@@ -144,11 +144,19 @@ class ChannelTable:
 
     A record may be there several times, and must then say the same each time. Of those that do not, two are kept:
     enough to tell that none is to be believed.
+
+    Parameters
+    ----------
+    keeps_records
+        Whether the file is copied, so that `record` is asked, and nothing depends on whether messages can be maps; else
+        only what tells that is kept, and definitions are held against the standard ones.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, keeps_records: bool = False) -> None:
         self._schemas: dict[int, list[_Schema]] = {0: [_Schema("", "", b"")]}
         self._channels: dict[int, list[_Described]] = {}
+        self._keeps_records = keeps_records
+        self._records: dict[tuple[int, int], bytes] = {}
 
     def add(self, opcode: int, content: bytes) -> None:
         """Take the content of a schema or channel record; others are passed over.
@@ -165,30 +173,46 @@ class ChannelTable:
             kept = definition if normalised_type(name) in _DEFINED_TYPES else b""
             if key:
                 _add_variant(self._schemas.setdefault(key, []), _Schema(name, encoding, kept))
+                self._keep(opcode, key, content)
         elif opcode == CHANNEL:
             fields = _Fields(content)
             key, schema, topic, encoding = fields.number(), fields.number(), fields.text(), fields.text()
             fields.block()
             _add_variant(self._channels.setdefault(key, []), _Described(topic, encoding, schema))
+            self._keep(opcode, key, content)
+
+    def _keep(self, opcode: int, key: int, content: bytes) -> None:
+        if self._keeps_records:
+            self._records.setdefault((opcode, key), content)
 
     def completed_by(self, other: ChannelTable) -> ChannelTable:
         """Return a table with what this one says and, where it says nothing, what the other one says."""
-        both = ChannelTable()
+        both = ChannelTable(keeps_records=self._keeps_records)
         both._schemas = {**other._schemas, **self._schemas}
         both._channels = {**other._channels, **self._channels}
+        both._records = {**other._records, **self._records}
         return both
+
+    def record(self, opcode: int, key: int) -> bytes | None:
+        """Return the content of the first record of a schema or channel; None if none has been met."""
+        return self._records.get((opcode, key))
+
+    def is_ambiguous(self, key: int) -> bool:
+        """Tell whether a channel, or its schema, is described in two ways."""
+        described = self._channels.get(key, [])
+        return len(described) > 1 or any(len(self._schemas.get(each.schema, ())) > 1 for each in described)
 
     def get(self, key: int) -> Channel | None:
         """Return a channel; None if it has not been met."""
         unknown: list[_Schema | None] = [None]
         variants = {
-            _channel(described, schema)
+            _channel(described, schema, is_copied=self._keeps_records)
             for described in self._channels.get(key, ())
             for schema in self._schemas.get(described.schema, unknown)
         }
         if len(variants) <= 1:
             return next(iter(variants), None)
-        first = _channel(self._channels[key][0], None)
+        first = _channel(self._channels[key][0], None, is_copied=self._keeps_records)
         may_matter = any(each.is_map or each.msgtype in TF_TYPES or each.problem for each in variants)
         problem = "the file describes it in two ways" if may_matter else ""
         return Channel(first.topic, "unknown", first.encoding, problem)
@@ -233,12 +257,12 @@ def _add_variant(variants: list[_T], variant: _T) -> None:
         variants.append(variant)
 
 
-def _channel(described: _Described, schema: _Schema | None) -> Channel:
+def _channel(described: _Described, schema: _Schema | None, *, is_copied: bool) -> Channel:
     topic, encoding, _ = described
     if schema is None:
         return Channel(topic, type_in(encoding, ""), encoding, NO_SCHEMA)
     msgtype = type_in(encoding, schema.name)
-    if msgtype in _DEFINED_TYPES and schema.encoding in _DEFINITION_ENCODINGS:
+    if msgtype in _DEFINED_TYPES and schema.encoding in _DEFINITION_ENCODINGS and not is_copied:
         text = schema.definition.decode(errors="replace")
         difference = differing_field(msgtype, text, 1 if encoding == "ros1" else 2)
         if difference is not None:

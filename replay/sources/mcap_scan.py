@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 from replay.skip_cause import SkipCause
 from replay.sources.losses import Loss
-from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content, inner_records
+from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content, describes, inner_records
 from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, Summary, file_crc, statistics_between
 from replay.sources.mcap_records import (
     CHANNEL,
@@ -53,26 +53,43 @@ class Scan:
         Where the chunk begins at which the file was cut off, if it was.
     losses
         What cannot be used.
+    bad_chunks
+        Where those begin of which nothing is used.
+    only_covered
+        Whether only messages are used that a checksum of their chunk covers.
+    table
+        What describes the channels.
     """
 
     contents: Contents
     entries: tuple[Entry, ...]
     cut_chunk: int | None = None
     losses: tuple[Loss, ...] = ()
+    bad_chunks: frozenset[int] = frozenset()
+    only_covered: bool = False
+    table: ChannelTable = field(default_factory=ChannelTable)
 
 
-def scan(file: RecordFile, wanted: Callable[[Channel], bool], summary: Summary | None = None) -> Scan:
+def scan(
+    file: RecordFile,
+    wanted: Callable[[Channel], bool] | None,
+    summary: Summary | None = None,
+    *,
+    keeps_records: bool = False,
+) -> Scan:
     """Pass through a file once.
 
     Parameters
     ----------
     wanted
-        Tells of which channels the messages are to be found.
+        Tells of which channels the messages are to be found; None for no messages at all.
     summary
         What it says is taken where nothing else does or, if it is checked, in place of what else does.
+    keeps_records
+        Whether the table of channels keeps their records.
     """
     walk = Walk(file, summary.places if summary else ())
-    found = _Found(file, wanted, summary)
+    found = _Found(file, wanted, summary, keeps_records=keeps_records)
     for record in walk:
         if record.opcode == CHUNK:
             found.add_chunk(record)
@@ -100,16 +117,25 @@ class _Messages:
 class _Found:
     """What a pass through a file has found so far."""
 
-    def __init__(self, file: RecordFile, wanted: Callable[[Channel], bool], summary: Summary | None) -> None:
+    def __init__(
+        self,
+        file: RecordFile,
+        wanted: Callable[[Channel], bool] | None,
+        summary: Summary | None,
+        *,
+        keeps_records: bool,
+    ) -> None:
         self._file = file
         self._wanted = wanted
         self._summary = summary
-        self._table, self._repeated = ChannelTable(), ChannelTable()
+        self._table = ChannelTable(keeps_records=keeps_records)
+        self._repeated = ChannelTable(keeps_records=keeps_records)
         self._is_wanted: dict[int, bool] = {}
         # those that a checksum of their own covers, and the others
         self._covered, self._others = _Messages(), _Messages()
         self._bad_chunks: list[tuple[int, BadPart, Counter[int] | None]] = []
         self._losses: list[Loss] = []
+        self._only_covered = False
 
     def describe(self, record: Record, *, is_repeated: bool) -> None:
         """Take in a schema or channel outside of chunks; behind the data they are only repeated."""
@@ -138,19 +164,25 @@ class _Found:
         self._add(message, record.start, NO_CHUNK, self._others)
 
     def _add_content(self, content: bytes, start: int, messages: _Messages) -> None:
-        records = list(inner_records(content))
+        # all is checked before any of it is taken in
+        if describes(content):
+            self._add_descriptions(content)
+        for record in inner_records(content):
+            if record.opcode == MESSAGE:
+                self._add(message_header(content, record.content), start, record.start, messages)
+
+    def _add_descriptions(self, content: bytes) -> None:
         try:
-            for record in records:
+            for record in inner_records(content):
                 if record.opcode in {SCHEMA, CHANNEL}:
                     self._table.add(record.opcode, content[record.content : record.end])
         except ValueError as error:
             raise BadPart(SkipCause.DAMAGED, f"a record in it does not describe a channel: {error}") from error
-        for record in records:
-            if record.opcode == MESSAGE:
-                self._add(message_header(content, record.content), start, record.start, messages)
 
     def _add(self, message: MessageHeader, block: int, inner: int, messages: _Messages) -> None:
         messages.add(message)
+        if self._wanted is None:
+            return
         key = message.channel
         if key not in self._is_wanted:
             channel = self._known().get(key)
@@ -165,12 +197,10 @@ class _Found:
             return self._summary.table.completed_by(self._table)
         return self._table
 
-    def _channels(self, counts: Mapping[int, int]) -> dict[int, Channel]:
+    def _channels(self, completed: ChannelTable, counts: Mapping[int, int]) -> dict[int, Channel]:
         """Return all channels, of those that are described behind the data alone only those that have messages."""
-        described = self._known()
-        known = described.all()
-        completed = described.completed_by(self._repeated).all()
-        return {key: channel for key, channel in completed.items() if key in known or counts.get(key)}
+        known = self._known().all()
+        return {key: channel for key, channel in completed.all().items() if key in known or counts.get(key)}
 
     def scan(self, walk: Walk) -> Scan:
         """Return what was found, once all was passed through."""
@@ -178,14 +208,22 @@ class _Found:
             self._add_cut_chunk(walk.cut_chunk)
         self._check_data(walk)
         counts = self._covered.counts + self._others.counts
-        channels = self._channels(counts)
+        table = self._known().completed_by(self._repeated)
+        channels = self._channels(table, counts)
         contents = Contents(channels, counts, *self._times_ns())
-        entries = sorted(
+        losses = tuple(self._all_losses(walk, contents))
+        bad_chunks = frozenset(start for start, _, _ in self._bad_chunks)
+        entries = tuple(self._entries(channels))
+        return Scan(contents, entries, walk.cut_chunk, losses, bad_chunks, self._only_covered, table)
+
+    def _entries(self, channels: Mapping[int, Channel]) -> list[Entry]:
+        if self._wanted is None:
+            return []
+        return sorted(
             entry
             for entry in (*self._covered.entries, *self._others.entries)
             if entry.channel in channels and self._wanted(channels[entry.channel])
         )
-        return Scan(contents, tuple(entries), walk.cut_chunk, tuple(self._all_losses(walk, contents)))
 
     def _add_cut_chunk(self, start: int) -> None:
         try:
@@ -207,6 +245,7 @@ class _Found:
         lost = self._others.counts.total()
         self._losses.append(Loss(SkipCause.WRONG_CHECKSUM, "the data section", detail, lost))
         self._others = _Messages()
+        self._only_covered = True
 
     def _times_ns(self) -> tuple[int | None, int | None]:
         times = [times for each in (self._covered, self._others) if (times := each.times_ns)]

@@ -13,6 +13,10 @@ class TooLargeError(Exception):
         super().__init__(over_memory(most_bytes))
 
 
+MORE_ALLOWED = "; a larger --max-memory allows more"
+"""What is said to those who can say how much is read at once."""
+
+
 def over_memory(most_bytes: int) -> str:
     """Return what is said of a chunk or message that has, or would decompress to, more than this."""
-    return f"it has more than {most_bytes} bytes, the most that is read at once; a larger --max-memory allows more"
+    return f"it has more than {most_bytes} bytes, the most that is read at once{MORE_ALLOWED}"
