@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -36,6 +37,7 @@ _U32 = struct.Struct("<I")
 NO_SCHEMA = "its schema is nowhere in the file"
 
 _BLOCK_BYTES = 1 << 20
+_INDEX_BLOCK_BYTES = _INDEX_ROW.size << 12
 _LEAST_UNWRITTEN_BYTES = 16
 _T = TypeVar("_T")
 
@@ -250,6 +252,26 @@ def _channel(described: _Described, schema: _Schema | None) -> Channel:
 
 
 @dataclass(frozen=True, slots=True)
+class MessageIndex:
+    """How many messages of a channel a chunk has; ``at`` is where in the file that says when and where they are."""
+
+    file: BinaryIO
+    channel: int
+    count: int
+    at: int
+    end: int
+
+    def rows(self) -> Iterator[tuple[int, int]]:
+        """Yield time and place in the chunk of each message, of which few are in memory at a time."""
+        at, stop = self.at, self.at + self.count * _INDEX_ROW.size
+        while at < stop:
+            self.file.seek(at)
+            block = self.file.read(min(_INDEX_BLOCK_BYTES, stop - at))
+            yield from _INDEX_ROW.iter_unpack(block)
+            at += len(block)
+
+
+@dataclass(frozen=True, slots=True)
 class RecordFile:
     """An open MCAP file.
 
@@ -317,19 +339,20 @@ class RecordFile:
         self.file.seek(record.content)
         return message_header(self.file.read(MESSAGE_HEAD.size))
 
-    def message_index(self, start: int) -> tuple[int, list[tuple[int, int]], int] | None:
-        """Return channel, rows of time and place, and the end of the message index at a byte; None if none is there."""
-        record = self.record_at(start)
-        if record is None or record.opcode != MESSAGE_INDEX:
+    def message_index(self, start: int, most: int | None = None) -> MessageIndex | None:
+        """Return the message index at a byte; None if none is there, or one of more messages than ``most``."""
+        found = self.head_at(start, _INDEX_HEAD.size)
+        if found is None or found[0].opcode != MESSAGE_INDEX or not self.is_whole(found[0]):
             return None
-        content = self.content(record)
-        if len(content) < _INDEX_HEAD.size:
+        record, head = found
+        if record.end - record.content < _INDEX_HEAD.size:
             return None
-        channel, length = _INDEX_HEAD.unpack_from(content)
-        rows = content[_INDEX_HEAD.size : _INDEX_HEAD.size + length]
-        if len(rows) != length or length % _INDEX_ROW.size:
+        channel, length = _INDEX_HEAD.unpack(head)
+        at = record.content + _INDEX_HEAD.size
+        count, rest = divmod(length, _INDEX_ROW.size)
+        if rest or at + length > record.end or (most is not None and count > most):
             return None
-        return channel, list(_INDEX_ROW.iter_unpack(rows)), record.end
+        return MessageIndex(self.file, channel, count, at, record.end)
 
 
 def written_bytes(file: BinaryIO, size: int) -> int:

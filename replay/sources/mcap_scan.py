@@ -269,8 +269,8 @@ def indexed_counts(file: RecordFile, start: int) -> Counter[int] | None:
     """Return how many messages of each channel a chunk has, as the indexes say that follow it; None if none do."""
     counts: Counter[int] = Counter()
     while (index := file.message_index(start)) is not None:
-        channel, rows, start = index
-        counts[channel] += len(rows)
+        counts[index.channel] += index.count
+        start = index.end
     return counts or None
 
 
