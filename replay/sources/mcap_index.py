@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from replay.sources.mcap_chunk import BadPart, inner_records
 from replay.sources.mcap_records import (
+    CHANNEL,
     CHUNK_INDEX,
     DATA_END,
     FOOTER,
@@ -22,10 +23,12 @@ from replay.sources.mcap_records import (
     MESSAGE_HEAD,
     NO_SCHEMA,
     RECORD,
+    SCHEMA,
     STATISTICS,
     Channel,
     ChannelTable,
     RecordFile,
+    check_description,
     foreign_errors,
     parser_stream,
 )
@@ -125,6 +128,8 @@ def _summary(file: RecordFile) -> Summary | None:
     table, chunks = ChannelTable(), []
     statistics: Statistics | None = None
     for record in inner_records(section):
+        if record.opcode in {SCHEMA, CHANNEL}:
+            check_description(record)
         content = section[record.content : record.end]
         table.add(record.opcode, content)
         if record.opcode == STATISTICS:

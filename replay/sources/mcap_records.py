@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, BinaryIO, NamedTuple, TypeVar
 
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
 from replay.sources.boundary import COMMON
-from replay.sources.definitions import differing_field
+from replay.sources.definitions import LARGEST_CHARS, differing_field
 from replay.sources.topics import ENCODINGS, normalised_type, type_in
 
 if TYPE_CHECKING:
@@ -39,7 +39,9 @@ NO_SCHEMA = "its schema is nowhere in the file"
 _BLOCK_BYTES = 1 << 20
 _INDEX_BLOCK_BYTES = _INDEX_ROW.size << 12
 _LEAST_UNWRITTEN_BYTES = 16
-_T = TypeVar("_T")
+_MOST_DESCRIPTION_BYTES = 1 << 24
+_MOST_DESCRIPTIONS_BYTES = 1 << 26
+_BYTES_A_CHARACTER = 4
 
 _DEFINED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 _DEFINITION_ENCODINGS = {"ros2msg", "ros1msg", "ros2idl", "omgidl"}
@@ -108,6 +110,19 @@ def message_data(container: bytes, start: int) -> bytes | None:
     return container[content + MESSAGE_HEAD.size : content + length]
 
 
+def check_description(record: Record) -> None:
+    """Refuse a schema or channel record that is larger than any description, before it is read.
+
+    Raises
+    ------
+    ValueError
+        If it is.
+    """
+    length = record.end - record.content
+    if length > _MOST_DESCRIPTION_BYTES:
+        raise ValueError(f"it has {length} bytes, and at most {_MOST_DESCRIPTION_BYTES} are read")
+
+
 @dataclass(frozen=True, slots=True)
 class Channel:
     """A channel with the type of its schema.
@@ -141,6 +156,9 @@ class _Described(NamedTuple):
     schema: int
 
 
+_Variant = TypeVar("_Variant", _Schema, _Described)
+
+
 class ChannelTable:
     """The channels and schemas met so far.
 
@@ -151,6 +169,7 @@ class ChannelTable:
     def __init__(self) -> None:
         self._schemas: dict[int, list[_Schema]] = {0: [_Schema("", "", b"")]}
         self._channels: dict[int, list[_Described]] = {}
+        self._held_bytes = 0
 
     def add(self, opcode: int, content: bytes) -> None:
         """Take the content of a schema or channel record; others are passed over.
@@ -158,20 +177,30 @@ class ChannelTable:
         Raises
         ------
         ValueError
-            If its fields do not fit it.
+            If its fields do not fit it, or more would be held of all such records than any recording needs.
         """
         if opcode == SCHEMA:
             fields = _Fields(content)
             key, name, encoding, definition = fields.number(), fields.text(), fields.text(), fields.block()
             # of other types it is never looked at
-            kept = definition if normalised_type(name) in _DEFINED_TYPES else b""
+            is_used = normalised_type(name) in _DEFINED_TYPES
+            # so much of a longer one that it is seen to be too long
+            kept = definition[: _BYTES_A_CHARACTER * LARGEST_CHARS + 1] if is_used else b""
             if key:
-                _add_variant(self._schemas.setdefault(key, []), _Schema(name, encoding, kept))
+                self._hold(self._schemas.setdefault(key, []), _Schema(name, encoding, kept))
         elif opcode == CHANNEL:
             fields = _Fields(content)
             key, schema, topic, encoding = fields.number(), fields.number(), fields.text(), fields.text()
             fields.block()
-            _add_variant(self._channels.setdefault(key, []), _Described(topic, encoding, schema))
+            self._hold(self._channels.setdefault(key, []), _Described(topic, encoding, schema))
+
+    def _hold(self, variants: list[_Variant], variant: _Variant) -> None:
+        if variant in variants or len(variants) >= 2:
+            return
+        self._held_bytes += sum(len(each) for each in variant if isinstance(each, str | bytes))
+        if self._held_bytes > _MOST_DESCRIPTIONS_BYTES:
+            raise ValueError(f"of all such records, at most {_MOST_DESCRIPTIONS_BYTES} bytes are held")
+        variants.append(variant)
 
     def completed_by(self, other: ChannelTable) -> ChannelTable:
         """Return a table with what this one says and, where it says nothing, what the other one says."""
@@ -228,11 +257,6 @@ class _Fields:
             raise ValueError(f"a field of {length} bytes does not fit into a record of {len(self._content)}")
         taken, self._at = self._content[self._at : end], end
         return taken
-
-
-def _add_variant(variants: list[_T], variant: _T) -> None:
-    if variant not in variants and len(variants) < 2:
-        variants.append(variant)
 
 
 def _channel(described: _Described, schema: _Schema | None) -> Channel:

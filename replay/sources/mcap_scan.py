@@ -31,6 +31,7 @@ from replay.sources.mcap_records import (
     MessageHeader,
     Record,
     RecordFile,
+    check_description,
     message_header,
 )
 from replay.sources.mcap_walk import Gap, Walk
@@ -114,6 +115,7 @@ class _Found:
     def describe(self, record: Record, *, is_repeated: bool) -> None:
         """Take in a schema or channel outside of chunks; behind the data they are only repeated."""
         try:
+            check_description(record)
             table = self._repeated if is_repeated else self._table
             table.add(record.opcode, self._file.content(record))
         except ValueError as error:
@@ -142,6 +144,7 @@ class _Found:
         try:
             for record in records:
                 if record.opcode in {SCHEMA, CHANNEL}:
+                    check_description(record)
                     self._table.add(record.opcode, content[record.content : record.end])
         except ValueError as error:
             raise BadPart(SkipCause.DAMAGED, f"a record in it does not describe a channel: {error}") from error
