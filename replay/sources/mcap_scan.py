@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 from replay.skip_cause import SkipCause
 from replay.sources.losses import Loss
-from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content, inner_records
+from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content, inner_records, without_last_record
 from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, Summary, file_crc, statistics_between
 from replay.sources.mcap_records import (
     CHANNEL,
@@ -76,7 +76,8 @@ def scan(file: RecordFile, wanted: Callable[[Channel], bool], summary: Summary |
     found = _Found(file, wanted, summary)
     for record in walk:
         if record.opcode == CHUNK:
-            found.add_chunk(record)
+            if not found.add_chunk(record, is_followed=walk.is_followed(record)):
+                walk.doubt(record)
         elif record.opcode == MESSAGE:
             found.add_loose(record, message_header(walk.head))
         elif record.opcode in {SCHEMA, CHANNEL}:
@@ -122,13 +123,24 @@ class _Found:
             if not is_repeated:
                 self._losses.append(_damaged(record.start, record.end, f"it does not describe a channel: {error}"))
 
-    def add_chunk(self, record: Record) -> None:
-        """Take in a chunk, all of it or nothing."""
+    def add_chunk(self, record: Record, *, is_followed: bool) -> bool:
+        """Take in a chunk, all of it or nothing; return whether it surely ends where it says.
+
+        Of one that has no checksum and is not followed by a record, some bytes may be missing. Then it has some of what
+        follows in its last message, which is not used; were they missing before that, its records would not fit.
+        """
         try:
             content, is_covered = chunk_content(self._file, record.start)
-            self._add_content(content, record.start, self._covered if is_covered else self._others)
+            is_sure = is_covered or is_followed
+            certain = content if is_sure else without_last_record(content)
+            self._add_content(certain, record.start, self._covered if is_covered else self._others)
         except BadPart as error:
             self._bad_chunks.append((record.start, error, indexed_counts(self._file, record.end)))
+            return is_followed
+        if len(certain) < len(content):
+            detail = "no record follows it and it has no checksum, so that bytes of its last message may be missing"
+            self._losses.append(Loss(SkipCause.DAMAGED, f"the chunk at byte {record.start}", detail, 1))
+        return is_sure
 
     def add_loose(self, record: Record, message: MessageHeader) -> None:
         """Take in a message outside of chunks."""
