@@ -15,7 +15,17 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from replay.skip_cause import SkipCause
-from replay.sources.mcap_records import CHANNEL, CHUNK, MESSAGE, MESSAGE_HEAD, RECORD, SCHEMA, Record, RecordFile
+from replay.sources.mcap_records import (
+    CHANNEL,
+    CHUNK,
+    MESSAGE,
+    MESSAGE_HEAD,
+    RECORD,
+    SCHEMA,
+    Record,
+    RecordFile,
+    message_header,
+)
 from replay.sources.memory import over_memory
 
 _HEAD = struct.Struct("<QQQII")
@@ -143,18 +153,27 @@ def _end_of_whole(plain: bytes, written: int) -> int:
     return end
 
 
-def without_last_record(content: bytes) -> bytes:
-    """Return a chunk's content without its last record.
+class Inside(NamedTuple):
+    """Which channels have messages in a chunk, and where its last record begins."""
+
+    channels: frozenset[int]
+    last_record: int
+
+
+def inside_of(content: bytes) -> Inside:
+    """Return what is in a decompressed chunk.
 
     Raises
     ------
     BadPart
         If its records do not fit it.
     """
-    start = 0
+    channels, start = set(), 0
     for record in inner_records(content):
         start = record.start
-    return content[:start]
+        if record.opcode == MESSAGE:
+            channels.add(message_header(content, record.content).channel)
+    return Inside(frozenset(channels), start)
 
 
 def inner_records(content: bytes) -> Iterator[Record]:

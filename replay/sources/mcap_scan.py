@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 from replay.skip_cause import SkipCause
 from replay.sources.losses import Loss
-from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content, inner_records, without_last_record
+from replay.sources.mcap_chunk import BadPart, Inside, chunk_content, cut_chunk_content, inner_records, inside_of
 from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, Summary, file_crc, statistics_between
 from replay.sources.mcap_records import (
     CHANNEL,
@@ -33,6 +33,7 @@ from replay.sources.mcap_records import (
     RecordFile,
     check_description,
     message_header,
+    message_header_at,
 )
 from replay.sources.mcap_walk import Gap, Walk
 from replay.sources.memory import over_memory
@@ -112,6 +113,10 @@ class _Found:
         self._covered, self._others = _Messages(), _Messages()
         self._bad_chunks: list[tuple[int, BadPart, Counter[int] | None]] = []
         self._losses: list[Loss] = []
+        # of chunks without a checksum: whether any has indexes; of those that have not all of theirs, where the last
+        # record in them begins, and where in the file those end that there are
+        self._has_indexes = False
+        self._without_index: dict[int, tuple[int, int]] = {}
 
     def describe(self, record: Record, *, is_repeated: bool) -> None:
         """Take in a schema or channel outside of chunks; behind the data they are only repeated."""
@@ -126,21 +131,47 @@ class _Found:
     def add_chunk(self, record: Record, *, is_followed: bool) -> bool:
         """Take in a chunk, all of it or nothing; return whether it surely ends where it says.
 
-        Of one that has no checksum and is not followed by a record, some bytes may be missing. Then it has some of what
-        follows in its last message, which is not used; were they missing before that, its records would not fit.
+        If it has no checksum, bytes of it may be missing. Were they missing within it, its records would not fit; of
+        its last message it does not show, which has some of what follows in their place.
         """
         try:
             content, is_covered = chunk_content(self._file, record.start)
             is_sure = is_covered or is_followed
-            certain = content if is_sure else without_last_record(content)
+            inside = None if is_covered else inside_of(content)
+            certain = content if inside is None or is_sure else content[: inside.last_record]
             self._add_content(certain, record.start, self._covered if is_covered else self._others)
         except BadPart as error:
             self._bad_chunks.append((record.start, error, indexed_counts(self._file, record.end)))
             return is_followed
         if len(certain) < len(content):
-            detail = "no record follows it and it has no checksum, so that bytes of its last message may be missing"
-            self._losses.append(Loss(SkipCause.DAMAGED, f"the chunk at byte {record.start}", detail, 1))
+            self._losses.append(_doubtful_end(record.start))
+        elif inside is not None:
+            self._look_for_indexes(record, inside)
         return is_sure
+
+    def _look_for_indexes(self, record: Record, inside: Inside) -> None:
+        """Note a chunk that has not all message indexes behind it.
+
+        If as many bytes of it are missing as an index has, that is in it, and the next record follows all the same.
+        """
+        indexed, end = indexes_behind(self._file, record.end)
+        self._has_indexes |= bool(indexed)
+        if indexed.keys() < inside.channels:
+            self._without_index[record.start] = inside.last_record, end
+
+    def _drop_doubtful(self, walk: Walk) -> None:
+        """Leave out the last message of chunks that have not all indexes though there are some."""
+        ends = {walk.ends_early, self._file.size, self._file.written}
+        doubtful = {block: inner for block, (inner, end) in self._without_index.items() if end not in ends}
+        if not self._has_indexes:
+            return
+        for block, inner in doubtful.items():
+            header = message_header_at(chunk_content(self._file, block)[0], inner)
+            if header is not None:
+                self._others.counts[header.channel] -= 1
+                self._losses.append(_doubtful_end(block))
+        left = [each for each in self._others.entries if doubtful.get(each.block) != each.inner]
+        self._others.entries = left
 
     def add_loose(self, record: Record, message: MessageHeader) -> None:
         """Take in a message outside of chunks."""
@@ -191,6 +222,7 @@ class _Found:
         """Return what was found, once all was passed through."""
         if walk.cut_chunk is not None:
             self._add_cut_chunk(walk.cut_chunk)
+        self._drop_doubtful(walk)
         self._check_data(walk)
         counts = self._covered.counts + self._others.counts
         channels = self._channels(counts)
@@ -268,6 +300,11 @@ class _Found:
         return [_damaged(end, self._file.size, "another recording begins there, after the end of this one: split them")]
 
 
+def _doubtful_end(start: int) -> Loss:
+    detail = "it has no checksum, and not what should follow it, so that bytes of its last message may be missing"
+    return Loss(SkipCause.DAMAGED, f"the chunk at byte {start}", detail, 1)
+
+
 def _damaged(start: int, stop: int, detail: str, messages: int | None = None) -> Loss:
     return Loss(SkipCause.DAMAGED, f"bytes {start} to {stop}", detail, messages)
 
@@ -282,11 +319,16 @@ def _ends_early(end: int, file: RecordFile) -> Loss:
 
 def indexed_counts(file: RecordFile, start: int) -> Counter[int] | None:
     """Return how many messages of each channel a chunk has, as the indexes say that follow it; None if none do."""
+    return indexes_behind(file, start)[0] or None
+
+
+def indexes_behind(file: RecordFile, start: int) -> tuple[Counter[int], int]:
+    """Return how many messages of each channel the message indexes from a byte on list, and where these end."""
     counts: Counter[int] = Counter()
     while (index := file.message_index(start)) is not None:
         counts[index.channel] += index.count
         start = index.end
-    return counts or None
+    return counts, start
 
 
 def chunk_loss(start: int, error: BadPart, lost: Counter[int] | None, channels: Mapping[int, Channel]) -> Loss:

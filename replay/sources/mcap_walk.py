@@ -161,7 +161,14 @@ class Walk:
 
     def is_followed(self, record: Record) -> bool:
         """Tell whether another record follows this one, or the end of what was written of the file."""
-        return self._follows(record.end) or self._is_cut_at(record.end)
+        if not self._follows(record.end):
+            return self._is_cut_at(record.end)
+        following = self._after_unknown(record.end)
+        found = None if following in {self._file.size, self._file.written} else self._head(following)
+        # By chance, the others are there more easily.
+        if found is None or found[0].opcode in _SURE:
+            return True
+        return self._follows(found[0].end) or self._is_cut_at(found[0].end)
 
     def doubt(self, record: Record) -> None:
         """Look for the next record within the one that was yielded last, and not behind it only.
@@ -287,6 +294,8 @@ class Walk:
 
     def _is_cut_at(self, start: int) -> bool:
         """Tell whether a record begins at a byte at which the file was cut off."""
+        if self._is_magic(self._file.size - len(MAGIC)):
+            return False
         found = self._head(start)
         if found is None:
             self._file.file.seek(start)
