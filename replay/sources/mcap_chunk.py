@@ -16,12 +16,24 @@ from io import BytesIO
 from typing import NamedTuple
 
 from replay.skip_cause import SkipCause
-from replay.sources.mcap_records import CHANNEL, CHUNK, MESSAGE, MESSAGE_HEAD, RECORD, SCHEMA, Record, RecordFile
+from replay.sources.mcap_records import (
+    CHANNEL,
+    CHUNK,
+    MESSAGE,
+    MESSAGE_HEAD,
+    RECORD,
+    SCHEMA,
+    Record,
+    RecordFile,
+    message_header,
+)
 from replay.sources.memory import over_memory
 
 _HEAD = struct.Struct("<QQQII")
 _LENGTH = struct.Struct("<Q")
 _COMPRESSIONS = {b"", b"lz4", b"zstd"}
+_INNER = {SCHEMA, CHANNEL, MESSAGE}
+_PRIVATE = 0x80
 # larger steps take longer: their memory is asked of the system anew each time
 _STEP_BYTES = 1 << 18
 
@@ -117,16 +129,52 @@ def cut_chunk_content(file: RecordFile, start: int) -> bytes:
     head = chunk_head(found[1]) if found else None
     if found is None or head is None:
         return b""
-    file.file.seek(found[0].content + head.head_bytes)
+    at = found[0].content + head.head_bytes
     # without the zeros at the end of the file, which a decompressor would take for data
-    data = file.file.read(max(0, min(file.written - file.file.tell(), file.most_bytes)))
+    stop = file.written if head.compression else file.size
+    file.file.seek(at)
+    data = file.file.read(max(0, min(stop - at, file.most_bytes)))
     plain = _joined(_decompressed(head.compression, data, file.most_bytes))
-    end = 0
+    # Zeros may be of a message, or may never have been written.
+    written = len(plain) if head.compression else file.written - at
+    return plain[: _end_of_whole(plain, written)]
+
+
+def _end_of_whole(plain: bytes, written: int) -> int:
+    """Return where the records end of which nothing is missing.
+
+    What cannot begin a record shows that bytes are missing of the one before.
+    """
+    end = before = 0
     for record in _records(plain):
-        if record.end > len(plain):
-            break
-        end = record.end
-    return plain[:end]
+        if record.end > len(plain) or written < record.end < len(plain):
+            is_record = record.start >= written or plain[record.start] in _INNER or plain[record.start] >= _PRIVATE
+            return end if is_record else before
+        before, end = end, record.end
+    return end
+
+
+class Inside(NamedTuple):
+    """Which channels have messages in a chunk, and where its last record begins."""
+
+    channels: frozenset[int]
+    last_record: int
+
+
+def inside_of(content: bytes) -> Inside:
+    """Return what is in a decompressed chunk.
+
+    Raises
+    ------
+    BadPart
+        If its records do not fit it.
+    """
+    channels, start = set(), 0
+    for record in inner_records(content):
+        start = record.start
+        if record.opcode == MESSAGE:
+            channels.add(message_header(content, record.content).channel)
+    return Inside(frozenset(channels), start)
 
 
 def describes(content: bytes) -> bool:

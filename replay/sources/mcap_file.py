@@ -94,16 +94,13 @@ class McapFile(Closing):
         return SourceInfo("mcap", contents.start_ns, contents.stop_ns, topic_table(rows))
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
-        """Yield the messages of these topics in order of log time, ties in the order in which they were written.
-
-        Only where an index turns out to be wrong on the way, messages that it hid may come late.
-        """
+        """Yield the messages of these topics in order of log time, ties in the order in which they were written."""
         with translated(self.path, foreign_errors()):
             done: list[Entry] = []
             entries = self._indexed(topics)
             if entries is not None:
                 try:
-                    for entry, message in self._read(entries, self._wanted(topics), _Chunks(self._file, entries)):
+                    for entry, message in self._read(entries, self._wanted(topics), self._claimed(entries)):
                         done.append(entry)
                         yield message
                 except _IndexLies:
@@ -111,11 +108,29 @@ class McapFile(Closing):
                 else:
                     return
             known = self._passed_through(topics)
-            had = {(entry.block, entry.inner) for entry in done}
             wanted = self._wanted(topics, known.contents)
-            left = [each for each in known.entries if each.channel in wanted and (each.block, each.inner) not in had]
-            for _, message in self._read(left, wanted, _Chunks(self._file, (), known.cut_chunk)):
+            left = self._in_order_after(done, [each for each in known.entries if each.channel in wanted])
+            for _, message in self._read(left, wanted, _Chunks(self._file, (), cut_chunk=known.cut_chunk)):
                 yield message
+
+    def _claimed(self, entries: Collection[Entry]) -> _Chunks:
+        chunks = self._summary.chunks if self._summary else ()
+        begins_ns = {chunk.chunk_start_offset: chunk.message_start_time for chunk in chunks}
+        return _Chunks(self._file, entries, begins_ns)
+
+    def _in_order_after(self, done: Collection[Entry], entries: Collection[Entry]) -> list[Entry]:
+        """Return the entries that are not done; those before what is done already are named and left out.
+
+        They would take the place of newer ones. No single wrong index can hide one so long.
+        """
+        had = {(entry.block, entry.inner) for entry in done}
+        reached_ns = max((entry.log_time_ns for entry in done), default=0)
+        left = [each for each in entries if (each.block, each.inner) not in had]
+        late = sum(each.log_time_ns < reached_ns for each in left)
+        if late:
+            detail = "the indexes say wrongly when they were recorded, which was met too late to use them in order"
+            self.losses.add(Loss(SkipCause.DAMAGED, "the message indexes", detail, late))
+        return [each for each in left if each.log_time_ns >= reached_ns]
 
     def close(self) -> None:
         """Close the file."""
@@ -154,7 +169,7 @@ class McapFile(Closing):
             return None
         if self.map_scan is not None and _are_maps(wanted):
             return None
-        return indexed_entries(self._file, self._summary.chunks, self._summary.contents.counts, wanted)
+        return indexed_entries(self._file, self._summary, wanted.keys())
 
     def _passed_through(self, topics: Collection[str]) -> Scan:
         """Return what a pass through the file finds of these topics."""
@@ -184,11 +199,12 @@ class McapFile(Closing):
         left = Counter(entry.block for entry in entries)
         for entry in entries:
             left[entry.block] -= 1
+            for block in chunks.begun(entry.log_time_ns):
+                self._check(chunks, block)
             try:
                 data = chunks.data(entry, is_last=not left[entry.block])
             except BadPart as error:
-                lost = indexed_counts(self._file, self._file.end_of(entry.block))
-                self.losses.add(chunk_loss(entry.block, error, lost, self._contents.channels))
+                self.losses.add(self._chunk_loss(entry.block, error))
                 continue
             if data is None:
                 continue
@@ -202,6 +218,16 @@ class McapFile(Closing):
                     continue
             yield entry, RawMessage(channel.topic, channel.msgtype, encoding, entry.log_time_ns, data)
 
+    def _check(self, chunks: _Chunks, block: int) -> None:
+        try:
+            chunks.check(block)
+        except BadPart as error:
+            self.losses.add(self._chunk_loss(block, error))
+
+    def _chunk_loss(self, block: int, error: BadPart) -> Loss:
+        lost = indexed_counts(self._file, self._file.end_of(block))
+        return chunk_loss(block, error, lost, self._contents.channels)
+
 
 class _Chunks:
     """The messages of a file, of which a few chunks are held at a time.
@@ -210,11 +236,20 @@ class _Chunks:
     ----------
     claims
         What indexes say is in the chunks. It is checked when a chunk is loaded, before any message of it is used.
+    begins_ns
+        When the first message of these chunks was recorded. No message of a later time may be used before what is
+        claimed of a chunk is checked, because a claim that is wrong may hide an earlier one.
     cut_chunk
         The chunk at which the file was cut off.
     """
 
-    def __init__(self, file: RecordFile, claims: Iterable[Entry], cut_chunk: int | None = None) -> None:
+    def __init__(
+        self,
+        file: RecordFile,
+        claims: Iterable[Entry],
+        begins_ns: Mapping[int, int] | None = None,
+        cut_chunk: int | None = None,
+    ) -> None:
         self._file = file
         self._cut_chunk = cut_chunk
         self._held = ChunkCache(self._loaded)
@@ -222,6 +257,24 @@ class _Chunks:
         self._claims: dict[int, list[Entry]] = {}
         for entry in claims:
             self._claims.setdefault(entry.block, []).append(entry)
+        begins = ((begin_ns, block) for block, begin_ns in (begins_ns or {}).items() if block in self._claims)
+        self._unchecked = sorted(begins, reverse=True)
+
+    def begun(self, time_ns: int) -> Iterator[int]:
+        """Yield the chunks that begin by this time, each once."""
+        while self._unchecked and self._unchecked[-1][0] <= time_ns:
+            yield self._unchecked.pop()[1]
+
+    def check(self, block: int) -> None:
+        """Hold what is claimed of a chunk against what is in it.
+
+        Raises
+        ------
+        BadPart
+            If it is found to be bad.
+        """
+        if block not in self._bad:
+            self._content(block)
 
     def data(self, entry: Entry, *, is_last: bool) -> bytes | None:
         """Return the data of a message; None if it is in a chunk that is known to be bad.
@@ -235,14 +288,17 @@ class _Chunks:
             return self._checked(self._file.record_bytes(entry.block), 0)
         if entry.block in self._bad:
             return None
-        try:
-            content = self._held[entry.block]
-        except BadPart:
-            self._bad.add(entry.block)
-            raise
+        content = self._content(entry.block)
         if is_last:
             self._held.forget(entry.block)
         return self._checked(content, entry.inner)
+
+    def _content(self, block: int) -> bytes:
+        try:
+            return self._held[block]
+        except BadPart:
+            self._bad.add(block)
+            raise
 
     def _checked(self, container: bytes, start: int) -> bytes:
         """Return the data of the message that was found at a byte before."""

@@ -8,23 +8,27 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections import Counter
 from collections.abc import Collection, Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from replay.sources.mcap_chunk import BadPart, inner_records
 from replay.sources.mcap_records import (
+    CHANNEL,
     CHUNK_INDEX,
     DATA_END,
     FOOTER,
     MAGIC,
+    MESSAGE_HEAD,
     NO_SCHEMA,
     RECORD,
+    SCHEMA,
     STATISTICS,
     Channel,
     ChannelTable,
     RecordFile,
+    check_description,
     foreign_errors,
     parser_stream,
 )
@@ -35,7 +39,9 @@ if TYPE_CHECKING:
 NO_CHUNK = -1
 
 _FOOTER = struct.Struct("<BQQQI")
+_CHUNK_TIMES = struct.Struct("<QQ")
 _DATA_END_BYTES = RECORD.size + 4
+_LEAST_MESSAGE_BYTES = RECORD.size + MESSAGE_HEAD.size
 _BLOCK_BYTES = 1 << 20
 
 
@@ -128,6 +134,8 @@ def _summary(file: RecordFile, table: ChannelTable) -> Summary | None:
     chunks = []
     statistics: Statistics | None = None
     for record in inner_records(section):
+        if record.opcode in {SCHEMA, CHANNEL}:
+            check_description(record)
         content = section[record.content : record.end]
         table.add(record.opcode, content)
         if record.opcode == STATISTICS:
@@ -210,33 +218,58 @@ def _is_complete(statistics: Statistics, channels: Mapping[int, Channel], chunks
     )
 
 
-def indexed_entries(
-    file: RecordFile, chunks: Collection[ChunkIndex], counts: Mapping[int, int], wanted: Collection[int]
-) -> tuple[Entry, ...] | None:
+def indexed_entries(file: RecordFile, summary: Summary, wanted: AbstractSet[int]) -> tuple[Entry, ...] | None:
     """Return where the messages of these channels are, sorted, as the message indexes say.
+
+    No checksum covers these. What the summary, and chunks themselves, say in their place is held against them.
 
     Returns
     -------
     tuple of Entry
-        None if the indexes do not find just as many messages as the statistics count, or one of them twice.
+        None if the indexes do not find just as many messages as the statistics count, or one of them twice, or at
+        times or places that their chunk does not have.
     """
+    counts = summary.statistics.channel_message_counts if summary.statistics else {}
+    left = {channel: counts.get(channel, 0) for channel in wanted}
     entries: list[Entry] = []
-    for chunk in chunks:
-        for channel in wanted:
-            offset = chunk.message_index_offsets.get(channel)
-            if offset is not None:
-                entries += _message_index(file, offset, channel, chunk.chunk_start_offset)
-    found = Counter(entry.channel for entry in entries)
-    if any(found[channel] != counts.get(channel, 0) for channel in wanted):
-        return None
-    if len({(entry.block, entry.inner) for entry in entries}) < len(entries):
+    for chunk in summary.chunks:
+        asked = wanted & chunk.message_index_offsets.keys()
+        if asked and not (summary.is_checked or _has_these_times(file, chunk)):
+            return None
+        for channel in sorted(asked):
+            most = min(left[channel], _most_messages(file, chunk))
+            found = _message_index(file, chunk, channel, most)
+            if found is None:
+                return None
+            left[channel] -= len(found)
+            entries += found
+    if any(left.values()) or len({(entry.block, entry.inner) for entry in entries}) < len(entries):
         return None
     return tuple(sorted(entries))
 
 
-def _message_index(file: RecordFile, offset: int, channel: int, block: int) -> list[Entry]:
-    """Return the entries of one message index; none if it is not there."""
-    found = file.message_index(offset)
-    if found is None or found[0] != channel:
-        return []
-    return [Entry(log_time, block, inner, channel) for log_time, inner in found[1]]
+def _has_these_times(file: RecordFile, chunk: ChunkIndex) -> bool:
+    """Tell whether a chunk says of its times what the summary does."""
+    found = file.head_at(chunk.chunk_start_offset, _CHUNK_TIMES.size)
+    said = chunk.message_start_time, chunk.message_end_time
+    return found is not None and len(found[1]) == _CHUNK_TIMES.size and _CHUNK_TIMES.unpack(found[1]) == said
+
+
+def _most_messages(file: RecordFile, chunk: ChunkIndex) -> int:
+    """Return how many messages a chunk has room for."""
+    return int(min(chunk.uncompressed_size, file.most_bytes) // _LEAST_MESSAGE_BYTES)
+
+
+def _message_index(file: RecordFile, chunk: ChunkIndex, channel: int, most: int) -> list[Entry] | None:
+    """Return the entries of one message index; None if it is not there, or not of this chunk."""
+    found = file.message_index(chunk.message_index_offsets[channel], most)
+    if found is None or found.channel != channel:
+        return None
+    first_ns, last_ns = chunk.message_start_time, chunk.message_end_time
+    last_place = chunk.uncompressed_size - _LEAST_MESSAGE_BYTES
+    entries = []
+    for log_time_ns, inner in found.rows():
+        if not first_ns <= log_time_ns <= last_ns or inner > last_place:
+            return None
+        entries.append(Entry(log_time_ns, chunk.chunk_start_offset, inner, channel))
+    return entries

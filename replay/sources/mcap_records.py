@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, BinaryIO, NamedTuple, TypeVar
 
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
 from replay.sources.boundary import COMMON
-from replay.sources.definitions import differing_field
+from replay.sources.definitions import LARGEST_CHARS, differing_field
 from replay.sources.topics import ENCODINGS, normalised_type, type_in
 
 if TYPE_CHECKING:
@@ -36,8 +37,11 @@ _U32 = struct.Struct("<I")
 NO_SCHEMA = "its schema is nowhere in the file"
 
 _BLOCK_BYTES = 1 << 20
+_INDEX_BLOCK_BYTES = _INDEX_ROW.size << 12
 _LEAST_UNWRITTEN_BYTES = 16
-_T = TypeVar("_T")
+_MOST_DESCRIPTION_BYTES = 1 << 24
+_MOST_DESCRIPTIONS_BYTES = 1 << 26
+_BYTES_A_CHARACTER = 4
 
 _DEFINED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 _DEFINITION_ENCODINGS = {"ros2msg", "ros1msg", "ros2idl", "omgidl"}
@@ -106,6 +110,19 @@ def message_data(container: bytes, start: int) -> bytes | None:
     return container[content + MESSAGE_HEAD.size : content + length]
 
 
+def check_description(record: Record) -> None:
+    """Refuse a schema or channel record that is larger than any description, before it is read.
+
+    Raises
+    ------
+    ValueError
+        If it is.
+    """
+    length = record.end - record.content
+    if length > _MOST_DESCRIPTION_BYTES:
+        raise ValueError(f"it has {length} bytes, and at most {_MOST_DESCRIPTION_BYTES} are read")
+
+
 @dataclass(frozen=True, slots=True)
 class Channel:
     """A channel with the type of its schema.
@@ -139,6 +156,9 @@ class _Described(NamedTuple):
     schema: int
 
 
+_Variant = TypeVar("_Variant", _Schema, _Described)
+
+
 class ChannelTable:
     """The channels and schemas met so far.
 
@@ -157,6 +177,7 @@ class ChannelTable:
         self._channels: dict[int, list[_Described]] = {}
         self._keeps_records = keeps_records
         self._records: dict[tuple[int, int], bytes] = {}
+        self._held_bytes = 0
 
     def add(self, opcode: int, content: bytes) -> None:
         """Take the content of a schema or channel record; others are passed over.
@@ -164,26 +185,36 @@ class ChannelTable:
         Raises
         ------
         ValueError
-            If its fields do not fit it.
+            If its fields do not fit it, or more would be held of all such records than any recording needs.
         """
         if opcode == SCHEMA:
             fields = _Fields(content)
             key, name, encoding, definition = fields.number(), fields.text(), fields.text(), fields.block()
             # of other types it is never looked at
-            kept = definition if normalised_type(name) in _DEFINED_TYPES else b""
+            is_used = normalised_type(name) in _DEFINED_TYPES
+            # so much of a longer one that it is seen to be too long
+            kept = definition[: _BYTES_A_CHARACTER * LARGEST_CHARS + 1] if is_used else b""
             if key:
-                _add_variant(self._schemas.setdefault(key, []), _Schema(name, encoding, kept))
+                self._hold(self._schemas.setdefault(key, []), _Schema(name, encoding, kept))
                 self._keep(opcode, key, content)
         elif opcode == CHANNEL:
             fields = _Fields(content)
             key, schema, topic, encoding = fields.number(), fields.number(), fields.text(), fields.text()
             fields.block()
-            _add_variant(self._channels.setdefault(key, []), _Described(topic, encoding, schema))
+            self._hold(self._channels.setdefault(key, []), _Described(topic, encoding, schema))
             self._keep(opcode, key, content)
 
     def _keep(self, opcode: int, key: int, content: bytes) -> None:
         if self._keeps_records:
             self._records.setdefault((opcode, key), content)
+
+    def _hold(self, variants: list[_Variant], variant: _Variant) -> None:
+        if variant in variants or len(variants) >= 2:
+            return
+        self._held_bytes += sum(len(each) for each in variant if isinstance(each, str | bytes))
+        if self._held_bytes > _MOST_DESCRIPTIONS_BYTES:
+            raise ValueError(f"of all such records, at most {_MOST_DESCRIPTIONS_BYTES} bytes are held")
+        variants.append(variant)
 
     def completed_by(self, other: ChannelTable) -> ChannelTable:
         """Return a table with what this one says and, where it says nothing, what the other one says."""
@@ -252,11 +283,6 @@ class _Fields:
         return taken
 
 
-def _add_variant(variants: list[_T], variant: _T) -> None:
-    if variant not in variants and len(variants) < 2:
-        variants.append(variant)
-
-
 def _channel(described: _Described, schema: _Schema | None, *, is_copied: bool) -> Channel:
     topic, encoding, _ = described
     if schema is None:
@@ -271,6 +297,26 @@ def _channel(described: _Described, schema: _Schema | None, *, is_copied: bool) 
         problem = f"its maps are encoded as '{encoding}'; {' or '.join(ENCODINGS)} is read: convert the recording"
         return Channel(topic, msgtype, encoding, problem)
     return Channel(topic, msgtype, encoding)
+
+
+@dataclass(frozen=True, slots=True)
+class MessageIndex:
+    """How many messages of a channel a chunk has; ``at`` is where in the file that says when and where they are."""
+
+    file: BinaryIO
+    channel: int
+    count: int
+    at: int
+    end: int
+
+    def rows(self) -> Iterator[tuple[int, int]]:
+        """Yield time and place in the chunk of each message, of which few are in memory at a time."""
+        at, stop = self.at, self.at + self.count * _INDEX_ROW.size
+        while at < stop:
+            self.file.seek(at)
+            block = self.file.read(min(_INDEX_BLOCK_BYTES, stop - at))
+            yield from _INDEX_ROW.iter_unpack(block)
+            at += len(block)
 
 
 @dataclass(frozen=True, slots=True)
@@ -341,19 +387,20 @@ class RecordFile:
         self.file.seek(record.content)
         return message_header(self.file.read(MESSAGE_HEAD.size))
 
-    def message_index(self, start: int) -> tuple[int, list[tuple[int, int]], int] | None:
-        """Return channel, rows of time and place, and the end of the message index at a byte; None if none is there."""
-        record = self.record_at(start)
-        if record is None or record.opcode != MESSAGE_INDEX:
+    def message_index(self, start: int, most: int | None = None) -> MessageIndex | None:
+        """Return the message index at a byte; None if none is there, or one of more messages than ``most``."""
+        found = self.head_at(start, _INDEX_HEAD.size)
+        if found is None or found[0].opcode != MESSAGE_INDEX or not self.is_whole(found[0]):
             return None
-        content = self.content(record)
-        if len(content) < _INDEX_HEAD.size:
+        record, head = found
+        if record.end - record.content < _INDEX_HEAD.size:
             return None
-        channel, length = _INDEX_HEAD.unpack_from(content)
-        rows = content[_INDEX_HEAD.size : _INDEX_HEAD.size + length]
-        if len(rows) != length or length % _INDEX_ROW.size:
+        channel, length = _INDEX_HEAD.unpack(head)
+        at = record.content + _INDEX_HEAD.size
+        count, rest = divmod(length, _INDEX_ROW.size)
+        if rest or at + length > record.end or (most is not None and count > most):
             return None
-        return channel, list(_INDEX_ROW.iter_unpack(rows)), record.end
+        return MessageIndex(self.file, channel, count, at, record.end)
 
 
 def written_bytes(file: BinaryIO, size: int) -> int:

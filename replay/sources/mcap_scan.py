@@ -17,7 +17,15 @@ from dataclasses import dataclass, field
 
 from replay.skip_cause import SkipCause
 from replay.sources.losses import Loss
-from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content, describes, inner_records
+from replay.sources.mcap_chunk import (
+    BadPart,
+    Inside,
+    chunk_content,
+    cut_chunk_content,
+    describes,
+    inner_records,
+    inside_of,
+)
 from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, Summary, file_crc, statistics_between
 from replay.sources.mcap_records import (
     CHANNEL,
@@ -31,7 +39,9 @@ from replay.sources.mcap_records import (
     MessageHeader,
     Record,
     RecordFile,
+    check_description,
     message_header,
+    message_header_at,
 )
 from replay.sources.mcap_walk import Walk
 from replay.sources.memory import over_memory
@@ -92,7 +102,8 @@ def scan(
     found = _Found(file, wanted, summary, keeps_records=keeps_records)
     for record in walk:
         if record.opcode == CHUNK:
-            found.add_chunk(record)
+            if not found.add_chunk(record, is_followed=walk.is_followed(record)):
+                walk.doubt(record)
         elif record.opcode == MESSAGE:
             found.add_loose(record, message_header(walk.head))
         elif record.opcode in {SCHEMA, CHANNEL}:
@@ -136,23 +147,65 @@ class _Found:
         self._bad_chunks: list[tuple[int, BadPart, Counter[int] | None]] = []
         self._losses: list[Loss] = []
         self._only_covered = False
+        # of chunks without a checksum: whether any has indexes; of those that have not all of theirs, where the last
+        # record in them begins, and where in the file those end that there are
+        self._has_indexes = False
+        self._without_index: dict[int, tuple[int, int]] = {}
 
     def describe(self, record: Record, *, is_repeated: bool) -> None:
         """Take in a schema or channel outside of chunks; behind the data they are only repeated."""
         try:
+            check_description(record)
             table = self._repeated if is_repeated else self._table
             table.add(record.opcode, self._file.content(record))
         except ValueError as error:
             if not is_repeated:
                 self._losses.append(_damaged(record.start, record.end, f"it does not describe a channel: {error}"))
 
-    def add_chunk(self, record: Record) -> None:
-        """Take in a chunk, all of it or nothing."""
+    def add_chunk(self, record: Record, *, is_followed: bool) -> bool:
+        """Take in a chunk, all of it or nothing; return whether it surely ends where it says.
+
+        If it has no checksum, bytes of it may be missing. Were they missing within it, its records would not fit; of
+        its last message it does not show, which has some of what follows in their place.
+        """
         try:
             content, is_covered = chunk_content(self._file, record.start)
-            self._add_content(content, record.start, self._covered if is_covered else self._others)
+            is_sure = is_covered or is_followed
+            inside = None if is_covered else inside_of(content)
+            certain = content if inside is None or is_sure else content[: inside.last_record]
+            self._add_content(certain, record.start, self._covered if is_covered else self._others)
         except BadPart as error:
             self._bad_chunks.append((record.start, error, indexed_counts(self._file, record.end)))
+            return is_followed
+        if len(certain) < len(content):
+            self._losses.append(_doubtful_end(record.start))
+        elif inside is not None:
+            self._look_for_indexes(record, inside)
+        return is_sure
+
+    def _look_for_indexes(self, record: Record, inside: Inside) -> None:
+        """Note a chunk that has not all message indexes behind it.
+
+        If as many bytes of it are missing as an index has, that is in it, and the next record follows all the same.
+        """
+        indexed, end = indexes_behind(self._file, record.end)
+        self._has_indexes |= bool(indexed)
+        if indexed.keys() < inside.channels:
+            self._without_index[record.start] = inside.last_record, end
+
+    def _drop_doubtful(self, walk: Walk) -> None:
+        """Leave out the last message of chunks that have not all indexes though there are some."""
+        ends = {walk.ends_early, self._file.size, self._file.written}
+        doubtful = {block: inner for block, (inner, end) in self._without_index.items() if end not in ends}
+        if not self._has_indexes:
+            return
+        for block, inner in doubtful.items():
+            header = message_header_at(chunk_content(self._file, block)[0], inner)
+            if header is not None:
+                self._others.counts[header.channel] -= 1
+                self._losses.append(_doubtful_end(block))
+        left = [each for each in self._others.entries if doubtful.get(each.block) != each.inner]
+        self._others.entries = left
 
     def add_loose(self, record: Record, message: MessageHeader) -> None:
         """Take in a message outside of chunks."""
@@ -175,6 +228,7 @@ class _Found:
         try:
             for record in inner_records(content):
                 if record.opcode in {SCHEMA, CHANNEL}:
+                    check_description(record)
                     self._table.add(record.opcode, content[record.content : record.end])
         except ValueError as error:
             raise BadPart(SkipCause.DAMAGED, f"a record in it does not describe a channel: {error}") from error
@@ -206,6 +260,7 @@ class _Found:
         """Return what was found, once all was passed through."""
         if walk.cut_chunk is not None:
             self._add_cut_chunk(walk.cut_chunk)
+        self._drop_doubtful(walk)
         self._check_data(walk)
         counts = self._covered.counts + self._others.counts
         table = self._known().completed_by(self._repeated)
@@ -308,6 +363,11 @@ class _Found:
         return [_damaged(end, self._file.size, "another recording begins there, after the end of this one: split them")]
 
 
+def _doubtful_end(start: int) -> Loss:
+    detail = "it has no checksum, and not what should follow it, so that bytes of its last message may be missing"
+    return Loss(SkipCause.DAMAGED, f"the chunk at byte {start}", detail, 1)
+
+
 def _damaged(start: int, stop: int, detail: str, messages: int | None = None) -> Loss:
     return Loss(SkipCause.DAMAGED, f"bytes {start} to {stop}", detail, messages)
 
@@ -322,11 +382,16 @@ def _ends_early(end: int, file: RecordFile) -> Loss:
 
 def indexed_counts(file: RecordFile, start: int) -> Counter[int] | None:
     """Return how many messages of each channel a chunk has, as the indexes say that follow it; None if none do."""
+    return indexes_behind(file, start)[0] or None
+
+
+def indexes_behind(file: RecordFile, start: int) -> tuple[Counter[int], int]:
+    """Return how many messages of each channel the message indexes from a byte on list, and where these end."""
     counts: Counter[int] = Counter()
     while (index := file.message_index(start)) is not None:
-        channel, rows, start = index
-        counts[channel] += len(rows)
-    return counts or None
+        counts[index.channel] += index.count
+        start = index.end
+    return counts, start
 
 
 def chunk_loss(start: int, error: BadPart, lost: Counter[int] | None, channels: Mapping[int, Channel]) -> Loss:

@@ -9,7 +9,7 @@ says nothing of one message.
 A length may be damaged and fit all the same. So what could be of any length is taken for a record only if one follows
 it; if none does, and nothing says that it is the next one which is damaged, both are passed over.
 
-The file is read once from its begin to its end; each place is looked at in constant time.
+The file is read from its begin to its end, and what is in doubt a few times; each place is looked at in constant time.
 """
 
 from __future__ import annotations
@@ -50,6 +50,9 @@ _HEAD_BYTES = CHUNK_HEAD_BYTES
 _BLOCK_BYTES = 1 << 20
 _NEAR_NS = 86_400 * 10**9
 _MOST_UNKNOWN = 16
+_MOST_TIMES_AGAIN = 4
+_LEAST_CONTENT_BYTES = 4
+_LONGEST_BYTES = 1 << 40
 _MOST_IN_CHAIN = 64
 _LEAST_WEIGHT = 4
 
@@ -126,6 +129,12 @@ class Walk:
         self._time_ns: int | None = None
         self._resumed: tuple[int, int | None] = (-1, None)
         self._looked_at: tuple[int, tuple[Record, bytes] | None] = (-1, None)
+        self._doubted: Record | None = None
+        # so that neither takes more than a few times as long as the file is
+        self._bytes_again = _MOST_TIMES_AGAIN * file.size
+        self._steps_left = _MOST_TIMES_AGAIN * file.size // RECORD.size
+        # a record of an unknown type, and where the records end that follow it and are of one as well
+        self._unknown = (-1, -1)
 
     def __iter__(self) -> Iterator[Record]:
         start = self._after_magic(len(MAGIC))
@@ -143,12 +152,39 @@ class Walk:
                 self.gaps.append(Gap(record.start, record.end, record.opcode))
             self._has_header |= record.opcode == HEADER
             yield record
-            start = record.end
+            start = self._after(record)
             if record.opcode == DATA_END:
                 self.data_end = record
             if record.opcode == FOOTER:
                 self.footer = record
                 return
+
+    def is_followed(self, record: Record) -> bool:
+        """Tell whether another record follows this one, or the end of what was written of the file."""
+        if not self._follows(record.end):
+            return self._is_cut_at(record.end)
+        following = self._after_unknown(record.end)
+        found = None if following in {self._file.size, self._file.written} else self._head(following)
+        # By chance, the others are there more easily.
+        if found is None or found[0].opcode in _SURE:
+            return True
+        return self._follows(found[0].end) or self._is_cut_at(found[0].end)
+
+    def doubt(self, record: Record) -> None:
+        """Look for the next record within the one that was yielded last, and not behind it only.
+
+        Where bytes of a record are missing, it has bytes of what follows in their place.
+        """
+        self._doubted = record
+
+    def _after(self, record: Record) -> int:
+        """Return where it goes on after a record."""
+        length = record.end - record.content
+        if self._doubted != record or length > self._bytes_again:
+            return record.end
+        self._bytes_again -= length
+        resumed = self._resume(record.content)
+        return record.end if resumed is None else min(resumed, record.end)
 
     def _after_magic(self, start: int) -> int:
         """Return where records begin; the magic bytes may be there several times."""
@@ -227,20 +263,51 @@ class Walk:
 
     def _follows(self, start: int, *, after_unknown: bool = False) -> bool:
         """Tell whether a record begins where another one ends, or the file is at its end there."""
-        for _ in range(_MOST_UNKNOWN):
-            if start in {self._file.size, self._file.written}:
-                return True
-            found = self._head(start)
-            if found is None or not self._file.is_whole(found[0]):
-                return False
-            if found[0].opcode in _KNOWN:
-                is_plausible = self._is_plausible(*found)
-                # These follow chunks only: what seems to be of an unknown type is a chunk with a damaged header.
-                is_chunk = is_plausible and after_unknown and found[0].opcode == MESSAGE_INDEX
-                self._has_chunks |= is_chunk
-                return is_plausible and not is_chunk
-            start = found[0].end
-        return False
+        known = self._after_unknown(start)
+        if known in {self._file.size, self._file.written}:
+            return True
+        found = self._head(known)
+        if found is None or not self._file.is_whole(found[0]) or found[0].opcode not in _KNOWN:
+            return False
+        is_plausible = self._is_plausible(*found)
+        # These follow chunks only: what seems to be of an unknown type is a chunk with a damaged header.
+        is_chunk = is_plausible and after_unknown and found[0].opcode == MESSAGE_INDEX
+        self._has_chunks |= is_chunk
+        return is_plausible and not is_chunk
+
+    def _after_unknown(self, start: int) -> int:
+        """Return where, from a record on, those end that are whole and of an unknown type."""
+        before, stop = self._unknown
+        if start == before or (before < stop and self._file.end_of(before) == start):
+            self._unknown = start, stop
+            return stop
+        stop = start
+        while self._steps_left > 0 and stop not in {self._file.size, self._file.written}:
+            found = self._head(stop)
+            if found is None or found[0].opcode in _KNOWN or not self._file.is_whole(found[0]):
+                break
+            stop = found[0].end
+            self._steps_left -= 1
+        if stop > start:
+            self._unknown = start, stop
+        return stop
+
+    def _is_cut_at(self, start: int) -> bool:
+        """Tell whether a record begins at a byte at which the file was cut off."""
+        if self._is_magic(self._file.size - len(MAGIC)):
+            return False
+        found = self._head(start)
+        if found is None:
+            self._file.file.seek(start)
+            return self._file.file.read(1) in {bytes([each]) for each in _KNOWN}
+        record, head = found
+        length = record.end - record.content
+        if record.opcode not in _KNOWN or record.end <= self._file.written or length >= _LONGEST_BYTES:
+            return False
+        written = head[: max(0, self._file.written - record.content)]
+        if record.opcode == MESSAGE_INDEX:
+            return length % 16 == 6 and (len(written) < 6 or self._is_plausible(record, written))
+        return record.opcode != CHUNK or len(written) < CHUNK_HEAD_BYTES or self._is_plausible(record, written)
 
     def _begins_damaged(self, record: Record, after: int) -> bool:
         """Tell whether it is the record that follows this one of which the header is damaged, and not this one's.
@@ -254,7 +321,8 @@ class Walk:
         if found is None:
             return False
         following, head = found
-        if following.end == after:
+        # No record has less content.
+        if following.end == after and following.end - following.content >= _LEAST_CONTENT_BYTES:
             return True
         if record.opcode != MESSAGE or following.opcode != MESSAGE or len(head) < MESSAGE_HEAD.size:
             return False

@@ -10,7 +10,7 @@ from typing import BinaryIO, Protocol
 
 from replay.skip_cause import SkipCause
 from replay.sources.memory import MOST_BYTES, over_memory
-from replay.sources.rosbag1_records import CONNECTION, MESSAGE, Record, find_in, is_unfinished, record_in
+from replay.sources.rosbag1_records import CONNECTION, INDEX, MESSAGE, Record, find_in, is_unfinished, record_in
 
 # What a decompressor is given and what it returns at once: a block of bz2 that takes 50 bytes may hold 46 MB.
 _BZ2_BYTES = 1 << 12
@@ -208,4 +208,6 @@ def records_in(chunk: bytes, place: ChunkPlace) -> Iterator[Record | None]:
         found = find_in(chunk, held.data if held else start + 1, _INNER)
         start, held = len(chunk) if found is None else found, None
     if held is not None:
-        yield held if place.has_sure_end or place.is_cut else None
+        # As many bytes as its index has may be missing: then that is in it, and a record follows all the same.
+        is_all_its_own = find_in(chunk, held.data, (INDEX,)) is None
+        yield held if is_all_its_own and (place.has_sure_end or place.is_cut) else None

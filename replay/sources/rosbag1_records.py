@@ -30,6 +30,8 @@ _FIELDS: dict[int, dict[bytes, int | None]] = {
     CHUNK_INFO: {b"ver": 4, b"chunk_pos": 8, b"start_time": 8, b"end_time": 8, b"count": 4},
     CONNECTION: {b"conn": 4, b"topic": None},
 }
+_NAMES = {b"op", *(name for fields in _FIELDS.values() for name in fields)}
+_LONGEST_NAME_BYTES = max(map(len, _NAMES)) + 1
 _OP = b"\x04\0\0\0op="
 # "none", "bz2" and "lz4"
 _COMPRESSION_SIZES = (4, 3)
@@ -94,7 +96,23 @@ def record_in(chunk: bytes, start: int) -> Record | None:
 def is_unfinished(rest: bytes) -> bool:
     """Tell whether bytes up to the end of what is there are too few to tell whether they are the header of a record."""
     length = _header_length(rest[:4])
-    return len(rest) < _U32.size or (length is not None and len(rest) < length + 8)
+    if length is None:
+        return len(rest) < _U32.size
+    return len(rest) < length + 8 and _are_known_fields(rest[4 : 4 + length], length)
+
+
+def _are_known_fields(header: bytes, length: int) -> bool:
+    """Tell whether what is there of a header of this length is what headers begin with."""
+    start = 0
+    while start + _U32.size <= len(header):
+        begin = start + _U32.size
+        start = begin + _U32.unpack_from(header, start)[0]
+        if start > length:
+            return False
+        name, separator, _ = header[begin : min(start, begin + _LONGEST_NAME_BYTES)].partition(b"=")
+        if not any(known == name if separator else known.startswith(name) for known in _NAMES):
+            return False
+    return True
 
 
 def record_of(file: BinaryIO, start: int) -> Record | None:

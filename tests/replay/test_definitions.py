@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import sys
 from typing import Literal
 
 import pytest
@@ -112,3 +113,60 @@ def test_definitions_in_idl() -> None:
     assert differing_field(UPDATE_TYPE, IDL.partition("IDL: std_msgs")[0].split("Update\n", 1)[1], 2) is None
     assert "width" in str(differing_field(UPDATE_TYPE, IDL.replace("uint32 width", "uint16 width"), 2))
     assert "stamp" in str(differing_field(UPDATE_TYPE, IDL.replace("Time stamp", "Duration stamp"), 2))
+
+
+def test_what_idl_allows_and_bytes_do_not_show_does_not_matter() -> None:
+    text = IDL.replace(
+        "struct OccupancyGridUpdate {",
+        """module OccupancyGridUpdate_Constants {
+      @verbatim (language="comment", text=
+        "a \\"map\\" (of }; cells)" "and more")
+      const long ODD = ((1 << 3) + (2));
+    };
+    /* struct Odd { */
+    typedef sequence<int8, 1000> Cells;
+    typedef std_msgs::msg::Header Head;
+    @topic
+    struct OccupancyGridUpdate {""",
+    )
+    text = text.replace("std_msgs::msg::Header header;", "@default (value=(1)) Head header;")
+    text = text.replace("int32 x;\n      int32 y;", "long x, y;").replace("uint32 width", "unsigned long width")
+    text = text.replace("sequence<int8> data", "msg::Cells data").replace("string frame_id", "string<40> frame_id")
+    assert "typedef" in text
+    assert differing_field(UPDATE_TYPE, text, 2) is None
+    assert "data" in str(differing_field(UPDATE_TYPE, text.replace("sequence<int8, 1000>", "int8"), 2))
+    array = text.replace("typedef sequence<int8, 1000> Cells", "typedef int8 Cells[4]")
+    assert "is int8[4] in the rec" in str(differing_field(UPDATE_TYPE, array, 2))
+
+
+NESTED = "(" * 100_000
+TEXTS = {
+    "parentheses": f"module a {{ const long X = {NESTED}1{NESTED.replace('(', ')')}; }};",
+    "annotation": f"module a {{ @b{NESTED}",
+    "sequences": "module a { struct b { " + "sequence<" * 20_000,
+    "modules": "module a {\n" * 20_000,
+    "comments": "module a {" + "/*" * 100_000,
+    "texts": "module a {" + "'\"" * 100_000,
+    "newlines": "\n" * 200_000 + "int8 x",
+    "spaces": "int8 " + " " * 200_000 + "-",
+    "separators": "===\n" * 60_000,
+    "long names": "module " + "a" * 100_000 + " { struct b { " + "c d;" * 30_000 + "}; };",
+    "long title": f"int8 x\n{LINE}\nMSG: {'a' * 100_000}/B\n" + "C d\n" * 30_000,
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_no_text_takes_longer_than_it_is_long(name: str) -> None:
+    steps = 0
+
+    def count(*_: object) -> None:
+        nonlocal steps
+        steps += 1
+
+    text = TEXTS[name]
+    sys.setprofile(count)
+    try:
+        assert differing_field(GRID_TYPE, text, 2) is not None
+    finally:
+        sys.setprofile(None)
+    assert steps < 40 * len(text)

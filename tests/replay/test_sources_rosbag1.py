@@ -240,6 +240,22 @@ def test_bytes_that_are_missing_within_a_message(tmp_path: Path) -> None:
     assert {each.place for each in losses} >= {f"the chunk at byte {chunks[0].start}"}
 
 
+def test_however_many_bytes_are_missing_of_a_message_it_is_not_used(tmp_path: Path) -> None:
+    """Also as many as the index behind its chunk has, and where little of the file is left behind it."""
+    messages = [bags.recorded_map("/r1/map", START + each * SECOND, seed=each, rows=20) for each in range(4)]
+    path = bags.write_rosbag1(tmp_path / "a.bag", messages, chunk_bytes=100)
+    data, written = path.read_bytes(), _recorded(messages)
+    chunks = bags.chunks(path)
+    assert len(chunks) == len(written)
+    for chunk, message in ((chunks[1], written[1]), (chunks[3], written[3])):
+        at = chunk.start + chunk.size - 500
+        for length in range(1, 240):
+            path.write_bytes(data[:at] + data[at + length :])
+            found, losses = _read(path)
+            assert found == [each for each in written if each != message], length
+            assert losses
+
+
 @pytest.mark.parametrize("compression", ["bz2", "lz4"])
 def test_bytes_that_are_missing_from_one_chunk_to_the_next(tmp_path: Path, compression: str) -> None:
     """What is left of two chunks looks like one: the index, which lists both, tells that there was another."""
