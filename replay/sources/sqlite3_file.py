@@ -21,7 +21,7 @@ from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.definitions import differing_field
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import MOST_BYTES, TooLargeError
-from replay.sources.sqlite3_beside import JOURNAL, WAL, beside, check_applied, check_journal, check_wal, copied
+from replay.sources.sqlite3_beside import plain_file
 from replay.sources.sqlite3_rows import BadRowError, BagTables, NoBagError, Record, Row, SalvagedTables, SqliteTables
 from replay.sources.sqlite3_salvage import read_header
 from replay.sources.topics import normalised_type, topic_table, type_in
@@ -62,7 +62,7 @@ class Sqlite3File(Closing):
         self._most_bytes = most_bytes
         self.losses = Losses()
         with ExitStack() as stack, translated(self.path, _FOREIGN):
-            self._plain = path.resolve()
+            self._plain = plain_file(path.resolve(), self.path, self.losses, stack)
             self._tables = self._open_tables(stack)
             self._topics = self._read_topics()
             self._times_ns = self._tables.times_ns()
@@ -106,18 +106,10 @@ class Sqlite3File(Closing):
 
     def _open_tables(self, stack: ExitStack) -> BagTables:
         """Return the tables: as SQLite reads them if it can, else as far as they are there."""
-        found = beside(self._plain)
-        wal = check_wal(self._plain, found[WAL], self.path, self.losses) if WAL in found else None
-        if JOURNAL in found:
-            check_journal(self._plain, found[JOURNAL], self.path, self.losses)
-        if found:
-            self._plain = copied(self._plain, found, stack)
-        elif not self._has_its_pages():
+        if not self._plain.is_consistent or not self._has_its_pages():
             return self._salvaged(stack)
         try:
-            database = stack.enter_context(closing(_connected(self._plain, is_copy=bool(found))))
-            if wal is not None:
-                check_applied(database, wal, self.path, self.losses)
+            database = stack.enter_context(closing(_connected(self._plain.path)))
             tables = SqliteTables(database)
             # all that is read of them but the data of messages
             tables.counts(), tables.indexed(), tables.times_ns(), tables.topics(), tables.definitions()
@@ -130,17 +122,18 @@ class Sqlite3File(Closing):
 
     def _has_its_pages(self) -> bool:
         """Tell whether the file has all pages that its header says, and only whole ones: SQLite does not mention it."""
-        with self._plain.open("rb") as file:
+        with self._plain.path.open("rb") as file:
             header = read_header(file)
-        size = self._plain.stat().st_size
+        size = self._plain.path.stat().st_size
         return header is not None and size % header.page_bytes == 0 and size >= (header.pages or 0) * header.page_bytes
 
     def _salvaged(self, stack: ExitStack) -> SalvagedTables:
-        file = stack.enter_context(self._plain.open("rb"))
-        header, size = read_header(file), self._plain.stat().st_size
+        file = stack.enter_context(self._plain.path.open("rb"))
+        header, size = read_header(file), self._plain.path.stat().st_size
         try:
             if header is None:
                 raise NoBagError("its first page is damaged or cut off")
+            header = header._replace(pages=self._plain.pages or header.pages)
             return SalvagedTables(file, size, header, self.losses)
         except NoBagError as error:
             raise InputError(
@@ -210,9 +203,9 @@ class Sqlite3File(Closing):
                 raise InputError(f"{self.path}: topic {topic.name} {_not_read(topic.encoding)}")
 
 
-def _connected(path: Path, *, is_copy: bool) -> sqlite3.Connection:
-    # Immutable, so that not even a lock file is left beside the recording.
-    uri = f"{path.as_uri()}?mode={'rw' if is_copy else 'ro&immutable=1'}"
+def _connected(path: Path) -> sqlite3.Connection:
+    # Immutable, so that not even a lock file is left beside the recording, and nothing beside it is looked at.
+    uri = f"{path.as_uri()}?mode=ro&immutable=1"
     # opened in one thread and read in another, but never in two at once
     return sqlite3.connect(uri, uri=True, check_same_thread=False)
 

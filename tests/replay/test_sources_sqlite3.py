@@ -4,6 +4,7 @@ import errno
 import hashlib
 import shutil
 import sqlite3
+import struct
 import tempfile
 from collections.abc import Iterable
 from contextlib import closing
@@ -20,6 +21,8 @@ from tests import bags
 from tests.replay.test_sources_open import refused
 
 Message = tuple[str, int, bytes]
+
+_JOURNAL_MAGIC = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
 
 
 @pytest.fixture
@@ -121,6 +124,47 @@ def test_a_journal_that_was_ended_by_erasing_its_beginning(tmp_path: Path) -> No
     assert _read(path) == (_recorded(bags.SAMPLE), ())
 
 
+@pytest.mark.parametrize("count", [0, 0xFFFFFFFF], ids=["none", "uncounted"])
+def test_a_journal_that_names_another_deletes_nothing(tmp_path: Path, count: int) -> None:
+    """SQLite would take the file that it names for a journal of several files, and delete it."""
+    path = bags.write_bare_db3(tmp_path / "a.db3")
+    victim = tmp_path / "victim.txt"
+    victim.write_text("mine")
+    name, pages = str(victim).encode(), path.stat().st_size // 4096
+    head = struct.pack(">8sIIIII", _JOURNAL_MAGIC, count, 1, pages, 512, 4096).ljust(512, b"\0")
+    numbers = struct.pack(">II", len(name), sum(name))
+    trailer = struct.pack(">I", 0x40000000 // 4096 + 1) + name + numbers + _JOURNAL_MAGIC
+    (tmp_path / "a.db3-journal").write_bytes(head + trailer)
+    found, losses = _read(path)
+    assert victim.read_text() == "mine"
+    assert found == _recorded(bags.SAMPLE)
+    assert [(str(each.cause), each.place) for each in losses] == [("damaged", "a.db3-journal")]
+    assert "names another journal" in losses[0].detail
+
+
+def test_a_journal_with_a_wrong_checksum_gives_nothing_that_was_not_recorded(tmp_path: Path) -> None:
+    path = _killed(tmp_path / "killed", "DELETE", is_committed=False)
+    journal = path.with_name("killed.db3-journal")
+    data = bytearray(journal.read_bytes())
+    data[512 + 4 + 96] ^= 1
+    journal.write_bytes(data)
+    found, losses = _read(path)
+    assert set(found) <= set(_twice())
+    assert {each.place for each in losses} >= {"killed.db3-journal"}
+    assert "the checksum of the page at byte" in losses[0].detail
+
+
+def test_pages_of_another_length_beside_a_file_are_not_used(tmp_path: Path) -> None:
+    path = bags.write_bare_db3(tmp_path / "a.db3")
+    page = bytes(1024)
+    record = struct.pack(">I", 1) + page + struct.pack(">I", 1)
+    head = struct.pack(">8sIIIII", _JOURNAL_MAGIC, 1, 1, 10, 512, 1024).ljust(512, b"\0")
+    (tmp_path / "a.db3-journal").write_bytes(head + record)
+    found, losses = _read(path)
+    assert found == _recorded(bags.SAMPLE)
+    assert [each.place for each in losses] == ["a.db3-journal"]
+
+
 def test_a_damaged_wal_is_used_up_to_the_damage(tmp_path: Path) -> None:
     path = _killed(tmp_path / "killed", "WAL", is_committed=True)
     wal = path.with_name("killed.db3-wal")
@@ -149,10 +193,51 @@ def test_a_wal_is_looked_for_beside_the_file_that_a_link_names(tmp_path: Path) -
     assert _read(link) == (_twice(), ())
 
 
-def test_a_file_and_its_wal_that_both_end_early(tmp_path: Path) -> None:
-    path = _killed(tmp_path / "killed", "WAL", is_committed=True)
-    path.write_bytes(path.read_bytes()[:20_000])
-    refused(path, "ends early at byte 20000", "killed.db3-wal")
+def _with_a_wal(folder: Path) -> Path:
+    """Leave a file of eight maps as a recorder does that is killed after it wrote each again into the ``-wal``."""
+    folder.mkdir()
+    messages = [bags.recorded_map("/r1/map", bags.START + each, seed=each, rows=400) for each in range(8)]
+    whole = bags.write_bare_db3(folder.parent / "a.db3", messages)
+    shutil.copy(whole, folder / "killed.db3")
+    with closing(sqlite3.connect(whole, isolation_level=None)) as database:
+        database.execute("PRAGMA journal_mode=WAL")
+        database.execute("PRAGMA wal_autocheckpoint=0")
+        database.execute("INSERT INTO messages (topic_id, timestamp, data) SELECT 1, timestamp + 9, data FROM messages")
+        shutil.copy(f"{whole}-wal", folder / "killed.db3-wal")
+    return folder / "killed.db3"
+
+
+@pytest.mark.parametrize("suffix", ["-wal", "-journal"])
+def test_a_file_that_ends_early_is_read_with_what_is_beside_it(tmp_path: Path, suffix: str) -> None:
+    path = _with_a_wal(tmp_path / "killed")
+    whole = path.read_bytes()
+    if suffix == "-journal":
+        path.with_name("killed.db3-wal").unlink()
+        head = struct.pack(">8sIIIII", _JOURNAL_MAGIC, 0, 1, len(whole) // 4096, 512, 4096)
+        path.with_name("killed.db3-journal").write_bytes(head.ljust(512, b"\0"))
+    recorded = _recorded(bags.recorded_map("/r1/map", bags.START + each, seed=each, rows=400) for each in range(8))
+    datas = {each[2] for each in recorded}
+    counts = set()
+    for length in range(20_000, len(whole), 20_011):
+        path.write_bytes(whole[:length])
+        found, losses = _read(path)
+        assert {each[2] for each in found} <= datas
+        assert "ends_early" in {str(each.cause) for each in losses}
+        path_alone = tmp_path / "alone.db3"
+        path_alone.write_bytes(path.read_bytes())
+        if _can_be_opened(path_alone):
+            assert set(_read(path_alone)[0]) <= set(found)
+            counts.add(len(found))
+    assert counts >= {2, 4, 6}
+
+
+def test_of_a_file_that_ends_early_the_wal_has_the_pages_that_are_missing(tmp_path: Path) -> None:
+    """As if it was cut off while they were moved from the one into the other."""
+    path = _with_a_wal(tmp_path / "killed")
+    with path.open("ab") as file:
+        file.write(b"\xff" * 5000)
+    found, losses = _read(path)
+    assert (len(found), losses) == (16, ())
 
 
 def test_an_empty_wal_is_no_harm(tmp_path: Path) -> None:
