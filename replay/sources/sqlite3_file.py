@@ -22,7 +22,7 @@ from replay.sources.definitions import differing_field
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import MOST_BYTES, TooLargeError
 from replay.sources.sqlite3_beside import plain_file
-from replay.sources.sqlite3_rows import BadRowError, BagTables, NoBagError, Record, Row, SalvagedTables, SqliteTables
+from replay.sources.sqlite3_rows import BadRowError, BagTables, NoBagError, Record, Row, SqliteTables, salvaged_tables
 from replay.sources.sqlite3_salvage import read_header
 from replay.sources.topics import normalised_type, topic_table, type_in
 from replay.sources.zstd import ZstdError, decompressed_cdr
@@ -125,16 +125,16 @@ class Sqlite3File(Closing):
         with self._plain.path.open("rb") as file:
             header = read_header(file)
         size = self._plain.path.stat().st_size
-        return header is not None and size % header.page_bytes == 0 and size >= (header.pages or 0) * header.page_bytes
+        return header is not None and size == (header.pages or size // header.page_bytes) * header.page_bytes
 
-    def _salvaged(self, stack: ExitStack) -> SalvagedTables:
+    def _salvaged(self, stack: ExitStack) -> BagTables:
         file = stack.enter_context(self._plain.path.open("rb"))
         header, size = read_header(file), self._plain.path.stat().st_size
         try:
             if header is None:
                 raise NoBagError("its first page is damaged or cut off")
             header = header._replace(pages=self._plain.pages or header.pages)
-            return SalvagedTables(file, size, header, self.losses)
+            return salvaged_tables(file, size, header, self.losses)
         except NoBagError as error:
             raise InputError(
                 f"{self.path}: none of this SQLite file of {size} bytes can be read: {error}; "
