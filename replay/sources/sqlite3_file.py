@@ -1,8 +1,8 @@
 """SQLite files of ROS 2 bags: ``.db3``.
 
 They are read with Python's own sqlite3, because it reads one row at a time in order of time and then of writing,
-whether or not the file has its index on time, and takes any path; the reader of rosbags does neither. What SQLite
-refuses, or would read wrongly because the file ends early, is read from its pages.
+whatever the file's index on time says, and takes any path; the reader of rosbags does neither. What SQLite refuses, or
+would read wrongly because the file ends early, is read from its pages.
 """
 
 from __future__ import annotations
@@ -86,19 +86,11 @@ class Sqlite3File(Closing):
         with translated(self.path, _FOREIGN):
             wanted = {key: topic for key, topic in self._topics.items() if topic.name in topics and not topic.problem}
             self._check_encodings(wanted.values())
-            met = dict.fromkeys(wanted, 0)
             for row in self._rows(wanted):
-                met[row.topic_id] += 1
                 topic = wanted[row.topic_id]
                 data = self._data(row, topic)
                 if data is not None:
                     yield RawMessage(topic.name, topic.msgtype, "cdr", row.log_time_ns, data)
-            for key, topic in wanted.items():
-                if met[key] < topic.count and isinstance(self._tables, SqliteTables):
-                    detail = f"the index on time lists {met[key]} of its {topic.count} messages"
-                    self.losses.add(
-                        Loss(SkipCause.DAMAGED, f"topic {topic.name}", detail, topic.count - met[key], topic.name)
-                    )
 
     def close(self) -> None:
         """Close the file, and remove its copy."""
@@ -110,7 +102,8 @@ class Sqlite3File(Closing):
             return self._salvaged(stack)
         try:
             database = stack.enter_context(closing(_connected(self._plain.path)))
-            tables = SqliteTables(database)
+            most_bytes = min(self._most_bytes, self._plain.path.stat().st_size)
+            tables = SqliteTables(database, most_bytes)
             # all that is read of them but the data of messages
             tables.counts(), tables.indexed(), tables.times_ns(), tables.topics(), tables.definitions()
         except NoBagError as error:

@@ -554,6 +554,55 @@ def test_without_an_index_on_time(tmp_path: Path) -> None:
         assert [(each.topic, each.log_time_ns) for each in source.messages(topics)] == expected
 
 
+@pytest.mark.parametrize("bit", [2, 20, 43])
+def test_what_the_index_on_time_says_changes_nothing(tmp_path: Path, bit: int) -> None:
+    """Nothing protects it: with another time in it a message would come late, or not be there."""
+    messages = [bags.recorded_map("/r1/map", bags.START + each * bags.SECOND, seed=each) for each in range(6)]
+    path = bags.write_bare_db3(tmp_path / "a.db3", messages)
+    data = bytearray(path.read_bytes())
+    (entry,) = _index_entries(data, messages[2].log_time_ns)
+    data[entry + 7 - bit // 8] ^= 1 << bit % 8
+    path.write_bytes(data)
+    assert _read(path) == (_recorded(messages), ())
+
+
+def _index_entries(whole: bytes, log_time_ns: int) -> list[int]:
+    """Return where a time is in pages of an index."""
+    time = log_time_ns.to_bytes(8, "big")
+    starts = [start for start in range(0, len(whole), 4096) if whole[start] == 0x0A]
+    return [start + at for start in starts if (at := whole[start : start + 4096].find(time)) >= 0]
+
+
+@pytest.mark.parametrize("key", ["1", "NULL"])
+def test_messages_of_which_ids_do_not_tell_them_apart(tmp_path: Path, key: str) -> None:
+    path = bags.write_bare_db3(tmp_path / "a.db3")
+    _execute(path, "ALTER TABLE messages RENAME TO before")
+    _execute(path, "CREATE TABLE messages (id INTEGER, topic_id INTEGER, timestamp INTEGER, data BLOB)")
+    _execute(path, "INSERT INTO messages SELECT KEY, topic_id, timestamp, data FROM before".replace("KEY", key))
+    assert _read(path) == (_recorded(bags.SAMPLE), ())
+    _execute(path, "UPDATE messages SET data = 'text' WHERE topic_id = 1")
+    losses = _read(path)[1]
+    assert sum(each.messages or 0 for each in losses) == len(losses) == 3
+
+
+def test_messages_that_are_computed_when_they_are_read_take_no_more_than_the_file(tmp_path: Path) -> None:
+    path = bags.write_bare_db3(tmp_path / "a.db3")
+    _execute(path, "ALTER TABLE messages RENAME TO before")
+    _execute(
+        path,
+        "CREATE TABLE messages (id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, "
+        "data BLOB AS (CAST(hex(zeroblob(200000000)) AS BLOB)))",
+    )
+    _execute(path, "INSERT INTO messages (topic_id, timestamp) SELECT topic_id, timestamp FROM before")
+    resource = pytest.importorskip("resource")
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    found, losses = _read(path)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000
+    assert found == []
+    assert {str(each.cause) for each in losses} == {"damaged"}
+    assert "too big" in losses[0].detail
+
+
 def test_database_without_messages(tmp_path: Path) -> None:
     with open_source(bags.write_bare_db3(tmp_path / "a.db3", [])) as source:
         assert (source.info.start_ns, source.info.topics) == (None, ())
