@@ -11,6 +11,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import BinaryIO
 
+# pages of tables and indexes begin with a number of their kind instead, the smallest of which is 2
+_LARGEST_NUMBER = (2 << 24) - 1
+
 
 @dataclass(frozen=True, slots=True)
 class Places:
@@ -40,6 +43,11 @@ class Places:
     def count(self) -> int:
         """The largest number that a page of the file may have."""
         return max(self.kept, self.there + self.shift if self.resumed <= self.there else 0)
+
+    def numbers(self) -> Iterator[int]:
+        """Yield the numbers of all pages whose numbers are known, but that of the first one."""
+        yield from range(2, self.kept + 1)
+        yield from range(self.resumed + self.shift, self.there + self.shift + 1)
 
     def place(self, number: int, *, is_sure: bool = True) -> int | None:
         """Return where a page is; None if it is missing or that cannot be told.
@@ -94,5 +102,5 @@ def _shifts(file: BinaryIO, page_bytes: int, there: int, most: int) -> Iterator[
     for place in range(2, there + 1):
         file.seek((place - 1) * page_bytes)
         (following,) = struct.unpack(">I", file.read(4))
-        if 2 <= following <= most:
+        if 2 <= following <= min(most, _LARGEST_NUMBER):
             yield place, following - 1 - place

@@ -134,8 +134,8 @@ class Pages:
         self._file = file
         self._header = header
         self._places = places
-        # whose each page is: a row's key, or that of no row but of the tree
-        self._owners = array("q", bytes(8 * (self.count + 1)))
+        # whose the page at each place is: a row's key, or that of no row but of the tree
+        self._owners = array("q", bytes(8 * (places.there + 1)))
 
     def tables(self) -> dict[str, Table]:
         """Return the tables by name.
@@ -194,12 +194,13 @@ class Pages:
         own: set[int] = set()
         try:
             for page in self._chain(cell):
-                owner = self._owners[page]
+                place = self._place(page)
+                owner = self._owners[place]
                 if owner not in {0, cell.key} or page in own:
                     self.is_broken = True
                     bad |= {cell.key, owner} - {_TREE}
                 own.add(page)
-                self._owners[page] = owner or cell.key
+                self._owners[place] = owner or cell.key
         except BadPageError:
             bad.add(cell.key)
         return bad
@@ -223,7 +224,7 @@ class Pages:
     def _chain(self, cell: Cell) -> Iterator[int]:
         """Yield the overflow pages of a row."""
         page, left = cell.overflow, cell.size - cell.local_bytes
-        if left > self.count * self._header.usable_bytes:
+        if left > self._places.there * self._header.usable_bytes:
             raise BadPageError("it is larger than the file")
         while left > 0:
             if not 2 <= page <= self.count:
@@ -241,10 +242,13 @@ class Pages:
 
     def _start(self, number: int, *, is_sure: bool = True) -> int:
         """Return where in the file a page begins."""
+        return (self._place(number, is_sure=is_sure) - 1) * self._header.page_bytes
+
+    def _place(self, number: int, *, is_sure: bool = True) -> int:
         place = self._places.place(number, is_sure=is_sure)
         if place is None:
             raise BadPageError(f"page {number} is missing")
-        return (place - 1) * self._header.page_bytes
+        return place
 
     def _page(self, start: int) -> bytes:
         self._file.seek(start)
@@ -254,13 +258,14 @@ class Pages:
         """Take in the rows with keys above ``low`` and up to ``high`` that are at and below a page."""
         try:
             # whether it is that page is told by its keys
-            place = self._start(number, is_sure=False)
-            page = self._page(place)
-            if not depth or self._owners[number]:
+            place = self._place(number, is_sure=False)
+            page_start = self._start(number, is_sure=False)
+            page = self._page(page_start)
+            if not depth or self._owners[place]:
                 raise BadPageError(f"page {number} has two places")
             start = _HEADER_BYTES if number == 1 else 0
             if page[start] == _LEAF:
-                cells = self._leaf(page, place, start, low, high)
+                cells = self._leaf(page, page_start, start, low, high)
                 children: list[tuple[int, int | None]] = []
             else:
                 cells, children = [], _children(page, start, low, high)
@@ -268,7 +273,7 @@ class Pages:
             self.is_broken |= 1 <= number <= self.count
             leaves.gaps.append(Gap(number, low, high))
             return
-        self._owners[number] = _TREE
+        self._owners[place] = _TREE
         self.sound.append(number)
         if cells:
             leaves.add(number, cells)
@@ -322,21 +327,21 @@ class Pages:
         An overflow page is never taken for one: it begins with the number of a page, which is less than 2 ** 24 in any
         file of less than 64 GB.
         """
-        if self.count >= _LEAF << 24:
+        if self._places.there >= _LEAF << 24:
             return
         # first and last key of each page that was found, in order; the rows of no two pages of a table interleave
         taken: list[tuple[int, int]] = []
-        for number in range(2, self.count + 1):
-            if self._owners[number]:
+        for number in self._places.numbers():
+            place, start = self._place(number), self._start(number)
+            if self._owners[place]:
                 continue
             try:
-                place = self._start(number)
-                page = self._page(place)
-                cells = self._leaf(page, place, 0, 0, None) if page[0] == _LEAF else []
+                page = self._page(start)
+                cells = self._leaf(page, start, 0, 0, None) if page[0] == _LEAF else []
             except (BadPageError, IndexError, struct.error):
                 continue
             if cells and all(map(is_row, cells)) and _belong(cells, leaves.gaps, taken):
-                self._owners[number] = _TREE
+                self._owners[place] = _TREE
                 leaves.add(number, cells)
                 insort(taken, (cells[0].key, cells[-1].key))
 

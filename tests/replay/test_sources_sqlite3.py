@@ -460,6 +460,24 @@ def test_whole_pages_that_are_missing_or_too_many_cost_no_more_than_what_is_arou
     assert found_behind > len(whole) // 4096 // 2
 
 
+@pytest.mark.parametrize("pages", [(2 << 24) - 2, (1 << 32) - 1])
+def test_a_number_of_pages_that_cannot_be_takes_no_memory(tmp_path: Path, pages: int) -> None:
+    """The last page agrees with it, so that it looks displaced by that many."""
+    messages = [bags.recorded_map("/r1/map", bags.START + each, seed=each, rows=400) for each in range(4)]
+    path = bags.write_bare_db3(tmp_path / "a.db3", messages)
+    data = bytearray(path.read_bytes())
+    data[28:32] = pages.to_bytes(4, "big")
+    data[-8192:-8188] = pages.to_bytes(4, "big")
+    data[-4096:-4092] = bytes(4)
+    path.write_bytes(data)
+    resource = pytest.importorskip("resource")
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    found, losses = _read(path)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000
+    assert set(found) < set(_recorded(messages))
+    assert losses != ()
+
+
 def test_pages_that_are_missing_at_two_places(tmp_path: Path) -> None:
     messages = [bags.recorded_map("/r1/map", bags.START + each, seed=each, rows=400) for each in range(12)]
     whole = bags.write_bare_db3(tmp_path / "a.db3", messages).read_bytes()
