@@ -165,6 +165,29 @@ def test_pages_of_another_length_beside_a_file_are_not_used(tmp_path: Path) -> N
     assert [each.place for each in losses] == ["a.db3-journal"]
 
 
+def test_a_wal_that_was_written_where_numbers_are_stored_the_other_way(tmp_path: Path) -> None:
+    path = _killed(tmp_path / "killed", "WAL", is_committed=True)
+    wal = path.with_name("killed.db3-wal")
+    data = bytearray(wal.read_bytes())
+    (page_bytes,) = struct.unpack_from(">I", data, 8)
+    data[:4] = struct.pack(">I", struct.unpack_from(">I", data)[0] ^ 1)
+    sums = _wal_sums(bytes(data[:24]), 0, 0)
+    data[24:32] = struct.pack(">II", *sums)
+    for start in range(32, len(data), 24 + page_bytes):
+        sums = _wal_sums(bytes(data[start : start + 8] + data[start + 24 : start + 24 + page_bytes]), *sums)
+        data[start + 16 : start + 24] = struct.pack(">II", *sums)
+    wal.write_bytes(data)
+    assert _read(path) == (_twice(), ())
+
+
+def _wal_sums(data: bytes, first: int, second: int) -> tuple[int, int]:
+    """Return the checksums as the description of the format has them."""
+    for one, other in struct.iter_unpack(">II", data):
+        first = (first + one + second) & 0xFFFFFFFF
+        second = (second + other + first) & 0xFFFFFFFF
+    return first, second
+
+
 def test_a_damaged_wal_is_used_up_to_the_damage(tmp_path: Path) -> None:
     path = _killed(tmp_path / "killed", "WAL", is_committed=True)
     wal = path.with_name("killed.db3-wal")
