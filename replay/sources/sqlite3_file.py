@@ -1,8 +1,8 @@
 """SQLite files of ROS 2 bags: ``.db3``.
 
 They are read with Python's own sqlite3, because it reads one row at a time in order of time and then of writing,
-whether or not the file has its index on time, and takes any path; the reader of rosbags does neither. What SQLite
-refuses, or would read wrongly because the file ends early, is read from its pages.
+whatever the file's index on time says, and takes any path; the reader of rosbags does neither. What SQLite refuses, or
+would read wrongly because the file ends early, is read from its pages.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.definitions import differing_field
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import MOST_BYTES, TooLargeError
-from replay.sources.sqlite3_beside import JOURNAL, WAL, beside, check_applied, check_journal, check_wal, copied
-from replay.sources.sqlite3_rows import BadRowError, BagTables, NoBagError, Record, Row, SalvagedTables, SqliteTables
+from replay.sources.sqlite3_beside import plain_file
+from replay.sources.sqlite3_rows import BadRowError, BagTables, NoBagError, Record, Row, SqliteTables, salvaged_tables
 from replay.sources.sqlite3_salvage import read_header
 from replay.sources.topics import normalised_type, topic_table, type_in
 from replay.sources.zstd import ZstdError, decompressed_cdr
@@ -62,7 +62,7 @@ class Sqlite3File(Closing):
         self._most_bytes = most_bytes
         self.losses = Losses()
         with ExitStack() as stack, translated(self.path, _FOREIGN):
-            self._plain = path.resolve()
+            self._plain = plain_file(path.resolve(), self.path, self.losses, stack)
             self._tables = self._open_tables(stack)
             self._topics = self._read_topics()
             self._times_ns = self._tables.times_ns()
@@ -91,19 +91,11 @@ class Sqlite3File(Closing):
         with translated(self.path, _FOREIGN):
             wanted = {key: topic for key, topic in self._topics.items() if topic.name in topics and not topic.problem}
             self._check_encodings(wanted.values())
-            met = dict.fromkeys(wanted, 0)
             for row in self._rows(wanted):
-                met[row.topic_id] += 1
                 topic = wanted[row.topic_id]
                 data = self._data(row, topic)
                 if data is not None:
                     yield RawMessage(topic.name, topic.msgtype, "cdr", row.log_time_ns, data)
-            for key, topic in wanted.items():
-                if met[key] < topic.count and isinstance(self._tables, SqliteTables):
-                    detail = f"the index on time lists {met[key]} of its {topic.count} messages"
-                    self.losses.add(
-                        Loss(SkipCause.DAMAGED, f"topic {topic.name}", detail, topic.count - met[key], topic.name)
-                    )
 
     def close(self) -> None:
         """Close the file, and remove its copy."""
@@ -111,19 +103,12 @@ class Sqlite3File(Closing):
 
     def _open_tables(self, stack: ExitStack) -> BagTables:
         """Return the tables: as SQLite reads them if it can, else as far as they are there."""
-        found = beside(self._plain)
-        wal = check_wal(self._plain, found[WAL], self.path, self.losses) if WAL in found else None
-        if JOURNAL in found:
-            check_journal(self._plain, found[JOURNAL], self.path, self.losses)
-        if found:
-            self._plain = copied(self._plain, found, stack)
-        elif not self._has_its_pages():
+        if not self._plain.is_consistent or not self._has_its_pages():
             return self._salvaged(stack)
         try:
-            database = stack.enter_context(closing(_connected(self._plain, is_copy=bool(found))))
-            if wal is not None:
-                check_applied(database, wal, self.path, self.losses)
-            tables = SqliteTables(database)
+            database = stack.enter_context(closing(_connected(self._plain.path)))
+            most_bytes = min(self._most_bytes, self._plain.path.stat().st_size)
+            tables = SqliteTables(database, most_bytes)
             # all that is read of them but the data of messages
             tables.counts(), tables.indexed(), tables.times_ns(), tables.topics(), tables.definitions()
         except NoBagError as error:
@@ -135,18 +120,19 @@ class Sqlite3File(Closing):
 
     def _has_its_pages(self) -> bool:
         """Tell whether the file has all pages that its header says, and only whole ones: SQLite does not mention it."""
-        with self._plain.open("rb") as file:
+        with self._plain.path.open("rb") as file:
             header = read_header(file)
-        size = self._plain.stat().st_size
-        return header is not None and size % header.page_bytes == 0 and size >= (header.pages or 0) * header.page_bytes
+        size = self._plain.path.stat().st_size
+        return header is not None and size == (header.pages or size // header.page_bytes) * header.page_bytes
 
-    def _salvaged(self, stack: ExitStack) -> SalvagedTables:
-        file = stack.enter_context(self._plain.open("rb"))
-        header, size = read_header(file), self._plain.stat().st_size
+    def _salvaged(self, stack: ExitStack) -> BagTables:
+        file = stack.enter_context(self._plain.path.open("rb"))
+        header, size = read_header(file), self._plain.path.stat().st_size
         try:
             if header is None:
                 raise NoBagError("its first page is damaged or cut off")
-            return SalvagedTables(file, size, header, self.losses)
+            header = header._replace(pages=self._plain.pages or header.pages)
+            return salvaged_tables(file, size, header, self.losses)
         except NoBagError as error:
             raise InputError(
                 f"{self.path}: none of this SQLite file of {size} bytes can be read: {error}; "
@@ -215,9 +201,9 @@ class Sqlite3File(Closing):
                 raise InputError(f"{self.path}: topic {topic.name} {_not_read(topic.encoding)}")
 
 
-def _connected(path: Path, *, is_copy: bool) -> sqlite3.Connection:
-    # Immutable, so that not even a lock file is left beside the recording.
-    uri = f"{path.as_uri()}?mode={'rw' if is_copy else 'ro&immutable=1'}"
+def _connected(path: Path) -> sqlite3.Connection:
+    # Immutable, so that not even a lock file is left beside the recording, and nothing beside it is looked at.
+    uri = f"{path.as_uri()}?mode=ro&immutable=1"
     # opened in one thread and read in another, but never in two at once
     return sqlite3.connect(uri, uri=True, check_same_thread=False)
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import sqlite3
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import BinaryIO, NamedTuple, Protocol
 
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import TooLargeError
+from replay.sources.sqlite3_places import Places, own_places, told_places
 from replay.sources.sqlite3_salvage import (
     BadPageError,
     Cell,
@@ -30,20 +31,24 @@ from replay.words import counted
 _USED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 _TOPICS = "SELECT * FROM topics"
 _DEFINITIONS = "SELECT * FROM message_definitions"
-# The index on time may be damaged while the table is not.
-_COUNTS = "SELECT topic_id, count(*) FROM messages NOT INDEXED GROUP BY topic_id"
+# The index on time is not used: it may be damaged while the table is not. Texts and bytes sort after all numbers.
+_COUNTS = (
+    "SELECT topic_id, count(*), min(CASE WHEN typeof(timestamp) = 'integer' THEN timestamp END), "
+    "max(CASE WHEN typeof(timestamp) = 'integer' THEN timestamp END) FROM messages NOT INDEXED GROUP BY topic_id"
+)
 # SQLite counts what is smallest, which is an index if there is one.
 _INDEXED = "SELECT count(*) FROM messages"
-_TIMES = "SELECT min(timestamp), max(timestamp) FROM messages"
-# Slower. The index on time may be damaged, and texts and bytes sort after all numbers.
-_TIMES_THAT_ARE = f"{_TIMES} NOT INDEXED WHERE typeof(timestamp) = 'integer'"
-_ROWS = "SELECT timestamp, id, topic_id FROM messages WHERE topic_id IN ({}) ORDER BY timestamp, id"
+_ROWS = (
+    "SELECT timestamp, {key}, topic_id FROM messages NOT INDEXED WHERE topic_id IN ({ids}) ORDER BY timestamp, {key}"
+)
 # To know how long it is, SQLite does not read it.
 _DATA = (
-    "SELECT timestamp, topic_id, length(data) > :most, CASE WHEN length(data) <= :most THEN data END FROM messages "
-    "WHERE id = :key"
+    "SELECT length(data) > :most, CASE WHEN length(data) <= :most THEN data END FROM messages NOT INDEXED "
+    "WHERE {key} = :key"
 )
 
+# what texts, such as definitions of messages, may be as long as where messages may not
+_LEAST_LIMIT_BYTES = 1 << 20
 # what the record of a message has besides its data, at most
 _MOST_BESIDE_BYTES = 64
 
@@ -101,15 +106,24 @@ class BagTables(Protocol):
 
 
 class SqliteTables:
-    """The tables as SQLite reads them; its errors pass."""
+    """The tables as SQLite reads them; its errors pass.
 
-    def __init__(self, database: sqlite3.Connection) -> None:
+    Parameters
+    ----------
+    most_bytes
+        The longest value that SQLite may make: columns may be defined to be computed, and then be longer than the file.
+    """
+
+    def __init__(self, database: sqlite3.Connection, most_bytes: int) -> None:
         self._database = database
+        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(max(most_bytes, _LEAST_LIMIT_BYTES), (1 << 31) - 1))
         database.text_factory = lambda text: text.decode("utf-8", "replace")
         names = {name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
         if not {"topics", "messages"} <= names:
             raise NoBagError("'topics' and 'messages' were expected")
         self._has_definitions = "message_definitions" in names
+        self._key = _key_column(database)
+        self._counted = database.execute(_COUNTS).fetchall()
 
     def topics(self) -> list[Record]:
         """Return the rows of ``topics``."""
@@ -121,7 +135,7 @@ class SqliteTables:
 
     def counts(self) -> Mapping[Value, int]:
         """Return how many messages each topic has."""
-        return dict(self._database.execute(_COUNTS))
+        return {topic_id: count for topic_id, count, _, _ in self._counted}
 
     def indexed(self) -> int:
         """Return how many messages the index on time lists; those that are there, without one."""
@@ -130,35 +144,43 @@ class SqliteTables:
 
     def times_ns(self) -> tuple[int, int] | None:
         """Return the times of the first and last message; None if there is none."""
-        for query in (_TIMES, _TIMES_THAT_ARE):
-            start_ns, stop_ns = self._database.execute(query).fetchone()
-            if isinstance(start_ns, int) and isinstance(stop_ns, int):
-                return start_ns, stop_ns
-        return None
+        times_ns = [(start_ns, stop_ns) for _, _, start_ns, stop_ns in self._counted if start_ns is not None]
+        return (min(start for start, _ in times_ns), max(stop for _, stop in times_ns)) if times_ns else None
 
     def rows(self, topic_ids: Collection[int]) -> Iterator[Row]:
         """Yield where the messages of these topics are, in order."""
-        rows = self._database.execute(_ROWS.format(", ".join("?" * len(topic_ids))), list(topic_ids))
-        return map(Row._make, rows)
+        ids = ", ".join("?" * len(topic_ids))
+        return map(Row._make, self._database.execute(_ROWS.format(key=self._key, ids=ids), list(topic_ids)))
 
     def data(self, row: Row, most_bytes: int) -> bytes:
         """Return the data of a message."""
         try:
-            found = self._database.execute(_DATA, {"key": row.key, "most": most_bytes}).fetchone()
+            values = {"key": row.key, "most": most_bytes}
+            found = self._database.execute(_DATA.format(key=self._key), values).fetchone()
         except sqlite3.DatabaseError as error:
             raise BadRowError(" ".join(str(error).split())) from error
-        if found is None or found[:2] != (row.log_time_ns, row.topic_id):
-            raise BadRowError("the index on time lists it otherwise than it is")
-        if found[2]:
+        if found is None:
+            raise BadRowError("it is not where the table lists it")
+        is_larger, data = found
+        if is_larger:
             raise TooLargeError(most_bytes)
-        if not isinstance(found[3], bytes):
-            raise BadRowError(f"its data is {type(found[3]).__name__}, not bytes")
-        return found[3]
+        if not isinstance(data, bytes):
+            raise BadRowError(f"its data is {type(data).__name__}, not bytes")
+        return data
 
     def _records(self, query: str) -> list[Record]:
         rows = self._database.execute(query)
         names = [column[0] for column in rows.description]
         return [dict(zip(names, row, strict=True)) for row in rows]
+
+
+def _key_column(database: sqlite3.Connection) -> str:
+    """Return by what rows are told apart: what is called ``id`` may be the same for several, or be nothing."""
+    try:
+        database.execute("SELECT _rowid_ FROM messages LIMIT 0")
+    except sqlite3.OperationalError:
+        return "id"
+    return "_rowid_"
 
 
 @dataclass(slots=True)
@@ -187,22 +209,48 @@ class _Found:
             self.cells[row.key] = cell
 
 
-class SalvagedTables:
-    """The tables as far as they are there.
+def salvaged_tables(file: BinaryIO, size: int, header: Header, losses: Losses) -> SalvagedTables:
+    """Return the tables as far as they are there, and name what is lost.
 
     Parameters
     ----------
     size
         How many bytes of the file are there.
-    losses
-        Takes what is lost.
-    """
 
-    def __init__(self, file: BinaryIO, size: int, header: Header, losses: Losses) -> None:
-        self._pages = Pages(file, size, header)
-        self._losses = losses
+    Raises
+    ------
+    NoBagError
+        If the tables cannot be told.
+    """
+    there = size // header.page_bytes
+    pages, tables, error = Pages(file, header, own_places(there)), None, NoBagError()
+    try:
+        tables = SalvagedTables(pages)
+    except NoBagError as found:
+        error = found
+    expected_bytes = (header.pages or there) * header.page_bytes
+    if size != expected_bytes:
+        places = told_places(file, header.page_bytes, there, header.pages, pages.sound)
+        # A file that merely ends early does not contradict itself.
+        if tables is None or pages.is_broken or places.is_displaced or size > expected_bytes:
+            tables = SalvagedTables(Pages(file, header, places))
+            tables.name_losses(losses, _displacement(places))
+            return tables
+    if tables is None:
+        raise error
+    missing = (header.pages or 0) - there
+    tables.name_losses(losses, _early_end(size, missing, header) if missing > 0 else None)
+    return tables
+
+
+class SalvagedTables:
+    """The tables as far as they are there."""
+
+    def __init__(self, pages: Pages) -> None:
+        self._pages = pages
+        self._losses: list[Loss] = []
         try:
-            self._tables = self._pages.tables()
+            self._tables = pages.tables()
         except BadPageError as error:
             raise NoBagError(str(error)) from error
         if not {"topics", "messages"} <= self._tables.keys():
@@ -216,13 +264,29 @@ class SalvagedTables:
         known = {row.get("id") for row in self._topics}
         self._leaves = self._pages.leaves(table.root, lambda cell: _is_message(table, cell, known))
         self._bad: set[int] = set()
-        self._doubtful_from: int | None = None
         self._found = self._collected({key for row in self._topics if (key := _used_topic(row)) is not None})
-        missing = (header.pages or 0) - self._pages.count
-        if missing <= 0 and size % header.page_bytes:
-            detail = f"the file has {size} bytes, which are not whole pages of {header.page_bytes}: some are too many"
-            losses.add(Loss(SkipCause.DAMAGED, "the file", detail, 0))
-        self._name_losses(f"byte {size}" if missing > 0 else "", f"{missing} of its {header.pages} pages are missing")
+
+    def name_losses(self, losses: Losses, whole: Loss | None = None) -> None:
+        """Name what is lost.
+
+        Parameters
+        ----------
+        whole
+            What is wrong with the file as a whole, if that is known: then messages are not named one by one.
+        """
+        for loss in self._losses:
+            losses.add(loss)
+        count = self._found.counts.total()
+        if whole is not None:
+            detail = f"{whole.detail}; {counted(count, 'message')} could be read"
+            losses.add(replace(whole, detail=detail, messages=_lost(self._leaves, count)))
+            return
+        for gap in self._leaves.gaps:
+            losses.add(_page_loss(gap, "messages"))
+        for key in sorted(self._bad):
+            if key > 0:
+                detail = "its pages are missing, another message's, or no message's"
+                losses.add(Loss(SkipCause.DAMAGED, f"message {key}", detail, 1))
 
     def topics(self) -> list[Record]:
         """Return the rows of ``topics`` that are there."""
@@ -270,25 +334,21 @@ class SalvagedTables:
         for gap in leaves.gaps:
             # what is beyond the end of the file is named as that
             if gap.page <= self._pages.count:
-                self._losses.add(_page_loss(gap, f"a part of the table '{name}'"))
+                self._losses.append(_page_loss(gap, f"a part of the table '{name}'"))
         return [_named(table, key, record) for key, record in self._pages.records(leaves)]
 
     def _collected(self, topic_ids: Collection[int]) -> _Found:
         """Return how many messages are there and, of these topics, where they are."""
         while True:
-            found, is_final, doubtful_from = _Found(frozenset(topic_ids)), True, self._doubtful_from
+            found, is_final = _Found(frozenset(topic_ids)), True
             for cell in self._pages.cells(self._leaves):
                 bad = self._pages.claim(cell) - self._bad
                 # A row that was added may turn out to share a page with a later one.
                 is_final &= bad <= {cell.key}
-                if self._pages.reaches(cell, doubtful_from):
-                    bad.add(cell.key)
                 self._bad |= bad
                 if cell.key not in self._bad:
                     self._add(found, cell)
-            # Only when all pages have been given is it known where bytes may be missing.
-            self._doubtful_from = self._pages.doubtful_from()
-            if is_final and self._doubtful_from == doubtful_from:
+            if is_final:
                 found.rows.sort()
                 return found
 
@@ -297,19 +357,6 @@ class SalvagedTables:
             found.add(_row(self._tables["messages"], cell), cell)
         except BadPageError:
             self._bad.add(cell.key)
-
-    def _name_losses(self, cut: str, missing: str) -> None:
-        gaps, count = self._leaves.gaps, self._found.counts.total()
-        if cut:
-            detail = f"the file ends early: {missing}; {counted(count, 'message')} could be read"
-            self._losses.add(Loss(SkipCause.ENDS_EARLY, cut, detail, _lost(self._leaves, count)))
-            return
-        for gap in gaps:
-            self._losses.add(_page_loss(gap, "messages"))
-        for key in sorted(self._bad):
-            if key > 0:
-                detail = "its pages are missing, another message's, or no message's"
-                self._losses.add(Loss(SkipCause.DAMAGED, f"message {key}", detail, 1))
 
 
 def _named(table: Table, key: int, record: list[Value]) -> Record:
@@ -354,3 +401,14 @@ def _used_topic(row: Record) -> int | None:
 def _page_loss(gap: Gap, what: str) -> Loss:
     messages = None if gap.high is None or what != "messages" else gap.high - gap.low
     return Loss(SkipCause.DAMAGED, f"page {gap.page}", f"{what} cannot be read: the page is damaged", messages)
+
+
+def _early_end(size: int, missing: int, header: Header) -> Loss:
+    detail = f"the file ends early: {missing} of its {header.pages} pages are missing"
+    return Loss(SkipCause.ENDS_EARLY, f"byte {size}", detail)
+
+
+def _displacement(places: Places) -> Loss:
+    until = f"page {places.resumed}" if places.resumed <= places.there else "the end"
+    detail = f"bytes are missing or too many between page {places.kept} and {until}: what is there cannot be told"
+    return Loss(SkipCause.DAMAGED, f"page {places.kept + 1}", detail)

@@ -19,6 +19,8 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from typing import BinaryIO, NamedTuple
 
+from replay.sources.sqlite3_places import Places
+
 _LEAF, _INTERIOR = 0x0D, 0x05
 _HEADER_BYTES = 100
 _LARGEST_KEY = (1 << 63) - 1
@@ -123,14 +125,17 @@ class Leaves:
 class Pages:
     """The pages of a SQLite file, as far as they are there."""
 
-    def __init__(self, file: BinaryIO, size: int, header: Header) -> None:
-        self.count = size // header.page_bytes
+    def __init__(self, file: BinaryIO, header: Header, places: Places) -> None:
+        self.count = places.count
+        self.is_broken = False
+        """Whether anything in the file contradicts anything else of it; that it ends early does not."""
+        self.sound: list[int] = []
+        """Pages that are what the pages that point to them say."""
         self._file = file
         self._header = header
-        # whose each page is: a row's key, or that of no row but of the tree
-        self._owners = array("q", bytes(8 * (self.count + 1)))
-        self._may_be_displaced = size % header.page_bytes != 0
-        self._first_broken: int | None = None
+        self._places = places
+        # whose the page at each place is: a row's key, or that of no row but of the tree
+        self._owners = array("q", bytes(8 * (places.there + 1)))
 
     def tables(self) -> dict[str, Table]:
         """Return the tables by name.
@@ -167,7 +172,8 @@ class Pages:
     def cells(self, leaves: Leaves) -> Iterator[Cell]:
         """Yield the rows of a table that are there, those of a page at once."""
         for number in leaves.pages:
-            yield from self._leaf(number, self._page(number), _HEADER_BYTES if number == 1 else 0, 0, None)
+            start = self._start(number, is_sure=False)
+            yield from self._leaf(self._page(start), start, _HEADER_BYTES if number == 1 else 0, 0, None)
 
     def records(self, leaves: Leaves) -> Iterator[tuple[int, list[Value]]]:
         """Yield key and values of the rows of a table, in order of key; those that are not whole are left out."""
@@ -188,41 +194,16 @@ class Pages:
         own: set[int] = set()
         try:
             for page in self._chain(cell):
-                owner = self._owners[page]
+                place = self._place(page)
+                owner = self._owners[place]
                 if owner not in {0, cell.key} or page in own:
+                    self.is_broken = True
                     bad |= {cell.key, owner} - {_TREE}
                 own.add(page)
-                self._owners[page] = owner or cell.key
+                self._owners[place] = owner or cell.key
         except BadPageError:
             bad.add(cell.key)
         return bad
-
-    def doubtful_from(self) -> int | None:
-        """Return the first page in which bytes may be missing, or too many; None if there is none.
-
-        All pages behind such a place are displaced, so that it is in the last page that is sound, or before. To be
-        asked when all rows have their pages.
-        """
-        if self._first_broken is None or not self._may_be_displaced:
-            return None
-        suspect = self._first_broken - 1
-        while suspect > 1 and not self._owners[suspect]:
-            suspect -= 1
-        return suspect
-
-    def reaches(self, cell: Cell, page: int | None) -> bool:
-        """Tell whether any of a row is in a page, or behind it."""
-        if page is None:
-            return False
-        try:
-            return cell.start >= (page - 1) * self._header.page_bytes or any(each >= page for each in self._chain(cell))
-        except BadPageError:
-            return True
-
-    def _is_broken(self, page: int) -> None:
-        """Remember that what a page of the file says is wrong."""
-        if 1 <= page <= self.count:
-            self._first_broken = min(page, self._first_broken or page)
 
     def payload(self, cell: Cell) -> bytes:
         """Return the record of a row.
@@ -235,7 +216,7 @@ class Pages:
         self._file.seek(cell.start)
         parts, left = [self._file.read(cell.local_bytes)], cell.size - cell.local_bytes
         for page in self._chain(cell):
-            self._file.seek((page - 1) * self._header.page_bytes + 4)
+            self._file.seek(self._start(page) + 4)
             parts.append(self._file.read(min(left, self._header.usable_bytes - 4)))
             left -= len(parts[-1])
         return b"".join(parts)
@@ -243,79 +224,89 @@ class Pages:
     def _chain(self, cell: Cell) -> Iterator[int]:
         """Yield the overflow pages of a row."""
         page, left = cell.overflow, cell.size - cell.local_bytes
-        holder = cell.start // self._header.page_bytes + 1
-        if left > self.count * self._header.usable_bytes:
+        if left > self._places.there * self._header.usable_bytes:
             raise BadPageError("it is larger than the file")
         while left > 0:
             if not 2 <= page <= self.count:
                 # that of a file that ends early is right all the same
-                if not self.count < page <= (self._header.pages or 0):
-                    self._is_broken(holder)
+                self.is_broken |= not self.count < page <= (self._header.pages or 0)
                 raise BadPageError(f"overflow page {page} is missing")
+            start = self._start(page)
             yield page
-            self._file.seek((page - 1) * self._header.page_bytes)
-            holder = page
+            self._file.seek(start)
             (page,) = struct.unpack(">I", self._file.read(4))
             left -= self._header.usable_bytes - 4
         if page:
-            self._is_broken(holder)
+            self.is_broken = True
             raise BadPageError("its overflow pages go on after its end")
 
-    def _page(self, number: int) -> bytes:
-        if not 1 <= number <= self.count:
+    def _start(self, number: int, *, is_sure: bool = True) -> int:
+        """Return where in the file a page begins."""
+        return (self._place(number, is_sure=is_sure) - 1) * self._header.page_bytes
+
+    def _place(self, number: int, *, is_sure: bool = True) -> int:
+        place = self._places.place(number, is_sure=is_sure)
+        if place is None:
             raise BadPageError(f"page {number} is missing")
-        self._file.seek((number - 1) * self._header.page_bytes)
+        return place
+
+    def _page(self, start: int) -> bytes:
+        self._file.seek(start)
         return self._file.read(self._header.usable_bytes)
 
     def _walk(self, number: int, low: int, high: int | None, leaves: Leaves, depth: int) -> None:
         """Take in the rows with keys above ``low`` and up to ``high`` that are at and below a page."""
         try:
-            page = self._page(number)
-            if not depth or self._owners[number]:
+            # whether it is that page is told by its keys
+            place = self._place(number, is_sure=False)
+            page_start = self._start(number, is_sure=False)
+            page = self._page(page_start)
+            if not depth or self._owners[place]:
                 raise BadPageError(f"page {number} has two places")
             start = _HEADER_BYTES if number == 1 else 0
             if page[start] == _LEAF:
-                cells = self._leaf(number, page, start, low, high)
+                cells = self._leaf(page, page_start, start, low, high)
                 children: list[tuple[int, int | None]] = []
             else:
                 cells, children = [], _children(page, start, low, high)
         except (BadPageError, IndexError, struct.error):
-            self._is_broken(number)
+            self.is_broken |= 1 <= number <= self.count
             leaves.gaps.append(Gap(number, low, high))
             return
-        self._owners[number] = _TREE
+        self._owners[place] = _TREE
+        self.sound.append(number)
         if cells:
             leaves.add(number, cells)
         for child, key in children:
             self._walk(child, low, key, leaves, depth - 1)
             low = key or low
 
-    def _leaf(self, number: int, page: bytes, start: int, low: int, high: int | None) -> list[Cell]:
-        """Return the rows of a leaf page; none of them unless all of them are sound."""
+    def _leaf(self, page: bytes, place: int, start: int, low: int, high: int | None) -> list[Cell]:
+        """Return the rows of a leaf page that begins at this byte of the file; none unless all of them are sound."""
         (count,) = struct.unpack_from(">H", page, start + 3)
-        places = struct.unpack_from(f">{count}H", page, start + 8)
+        offsets = struct.unpack_from(f">{count}H", page, start + 8)
         cells, extents = [], []
-        for place in places:
-            cell, end = self._cell(number, page, place)
+        for offset in offsets:
+            cell, end = self._cell(page, place, offset)
             if not low < cell.key <= (_LARGEST_KEY if high is None else high):
                 raise BadPageError("keys are not in order")
             low = cell.key
             cells.append(cell)
-            extents.append((place, end))
+            extents.append((offset, end))
         extents.sort()
         ends = [start + 8 + 2 * count, *(end for _, end in extents)]
-        if any(place < end for (place, _), end in zip(extents, ends, strict=False)) or ends[-1] > len(page):
+        if any(offset < end for (offset, _), end in zip(extents, ends, strict=False)) or ends[-1] > len(page):
             raise BadPageError("rows overlap")
         return cells
 
-    def _cell(self, number: int, page: bytes, place: int) -> tuple[Cell, int]:
-        size, at = varint(page, place)
+    def _cell(self, page: bytes, place: int, offset: int) -> tuple[Cell, int]:
+        size, at = varint(page, offset)
         key, at = varint(page, at)
         local_bytes = self._local_bytes(size)
         end = at + local_bytes
         head = page[at : min(end, at + _HEAD_BYTES)]
         layout_of(head, size)
-        start = (number - 1) * self._header.page_bytes + at
+        start = place + at
         if local_bytes == size:
             return Cell(key, size, start, local_bytes, 0, head), end
         (overflow,) = struct.unpack_from(">I", page, end)
@@ -336,20 +327,21 @@ class Pages:
         An overflow page is never taken for one: it begins with the number of a page, which is less than 2 ** 24 in any
         file of less than 64 GB.
         """
-        if self.count >= _LEAF << 24:
+        if self._places.there >= _LEAF << 24:
             return
         # first and last key of each page that was found, in order; the rows of no two pages of a table interleave
         taken: list[tuple[int, int]] = []
-        for number in range(2, self.count + 1):
-            if self._owners[number]:
+        for number in self._places.numbers():
+            place, start = self._place(number), self._start(number)
+            if self._owners[place]:
                 continue
             try:
-                page = self._page(number)
-                cells = self._leaf(number, page, 0, 0, None) if page[0] == _LEAF else []
+                page = self._page(start)
+                cells = self._leaf(page, start, 0, 0, None) if page[0] == _LEAF else []
             except (BadPageError, IndexError, struct.error):
                 continue
             if cells and all(map(is_row, cells)) and _belong(cells, leaves.gaps, taken):
-                self._owners[number] = _TREE
+                self._owners[place] = _TREE
                 leaves.add(number, cells)
                 insort(taken, (cells[0].key, cells[-1].key))
 

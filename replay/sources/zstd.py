@@ -6,6 +6,8 @@ word.
 
 from __future__ import annotations
 
+import errno
+import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,6 +22,8 @@ from replay.sources.memory import MOST_BYTES, TooLargeError
 MAGIC = b"\x28\xb5\x2f\xfd"
 
 _PIECE_BYTES = 1 << 20
+# Of what is free where it is decompressed: other programs need some, too, and a few kilobytes can become any number.
+_MOST_OF_FREE = 0.75
 
 ZstdError = zstd.ZstdError
 
@@ -41,13 +45,18 @@ def decompress_file(source: Path, target: Path, beginnings: Sequence[bytes] = (b
     ------
     ZstdError
         If it is damaged: what follows, and some of what precedes the damage, is not what it was.
+    OSError
+        If it takes nearly all that is free.
     """
+    most_bytes = int(shutil.disk_usage(target.parent).free * _MOST_OF_FREE)
     with source.open("rb") as compressed, target.open("wb") as plain:
         decompressor = zstd.ZstdDecompressor()
         piece = compressed.read(_PIECE_BYTES)
         while piece or not (decompressor.needs_input or decompressor.eof):
             output = decompressor.decompress(piece, _PIECE_BYTES)
             is_first = plain.tell() == 0
+            if plain.tell() + len(output) > most_bytes:
+                raise OSError(errno.ENOSPC, f"decompressed, it takes more than {_MOST_OF_FREE:.0%} of what is free")
             plain.write(output)
             if is_first and not any(each.startswith(output[: len(each)]) for each in beginnings):
                 return True

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -190,6 +191,20 @@ def test_a_compressed_part_that_grows_beyond_what_a_file_may_have(tmp_path: Path
     part.write_bytes(part.read_bytes() + zstd.compress(bytes(1 << 26)))
     with files_up_to(1 << 22):
         refused(path, part.name, "`ulimit -f`", "TMPDIR")
+
+
+@pytest.mark.parametrize("free_bytes", [1 << 24, 10_000_000])
+def test_a_compressed_part_leaves_some_of_what_is_free(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, free_bytes: int
+) -> None:
+    """It begins like a recording, so that nothing tells what it becomes before it is that."""
+    path = bags.write_rosbag2(tmp_path / "bag", storage="mcap", compression="file")
+    (part,) = path.glob("*.zstd")
+    part.write_bytes(zstd.compress(b"\x89MCAP0\r\n" + b"\xff" * (1 << 25)))
+    before = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: before._replace(free=free_bytes))
+    with files_up_to(free_bytes * 4 // 5):
+        refused(path, part.name, "more than 75% of what is free", "TMPDIR")
 
 
 def test_damage_in_a_compressed_part_names_the_part_not_its_copy(tmp_path: Path) -> None:
