@@ -41,6 +41,12 @@ class Plain:
     is_consistent: bool = True
 
 
+def beside(path: Path) -> dict[str, Path]:
+    """Return what is beside a file that SQLite would need, by suffix; what is empty is not needed."""
+    found = {suffix: path.with_name(path.name + suffix) for suffix in _READERS}
+    return {suffix: each for suffix, each in found.items() if each.is_file() and each.stat().st_size > 0}
+
+
 def plain_file(path: Path, shown: Path, losses: Losses, stack: ExitStack) -> Plain:
     """Return a file, or a copy of it with what is beside it, that is there as long as the stack; name what is lost.
 
@@ -50,16 +56,14 @@ def plain_file(path: Path, shown: Path, losses: Losses, stack: ExitStack) -> Pla
         How the file is called.
     """
     plain = Plain(path)
-    for suffix, read in _READERS.items():
-        beside, name = path.with_name(path.name + suffix), f"{shown.name}{suffix}"
-        if not beside.is_file() or not beside.stat().st_size:
-            continue
-        log = read(beside, name, losses)
+    for suffix, left in beside(path).items():
+        name = f"{shown.name}{suffix}"
+        log = _READERS[suffix](left, name, losses)
         if log is not None and log.places and not _belongs(plain.path, log):
             losses.add(Loss(SkipCause.DAMAGED, name, "it does not belong to the file: its pages have another length"))
             log = PageLog(0, 0, is_whole=False)
         if log is not None:
-            plain = _with(plain, log, beside, stack)
+            plain = _with(plain, log, left, stack)
     return plain
 
 

@@ -21,7 +21,7 @@ from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.definitions import differing_field
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import MOST_BYTES, TooLargeError
-from replay.sources.sqlite3_beside import plain_file
+from replay.sources.sqlite3_beside import beside, plain_file
 from replay.sources.sqlite3_rows import BadRowError, BagTables, NoBagError, Record, Row, SqliteTables, salvaged_tables
 from replay.sources.sqlite3_salvage import read_header
 from replay.sources.topics import normalised_type, topic_table, type_in
