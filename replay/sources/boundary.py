@@ -26,6 +26,8 @@ TEXT_MODE = (
     " (Git: mark it `binary` in .gitattributes)"
 )
 
+COPY_AGAIN = "copy it again if there is a whole one"
+
 _NO_SPACE = "free space in the temporary folder, or name another in the environment variable TMPDIR"
 # The machine's limits, which say nothing about the recording.
 _LIMITS = {

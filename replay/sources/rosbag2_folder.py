@@ -15,7 +15,7 @@ from replay.skip_cause import SkipCause
 from replay.sources.base import RawMessage, Source, SourceInfo
 from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.compressed_file import head_of, name_early_end, plain_copy, too_early
-from replay.sources.losses import Loss, Losses
+from replay.sources.losses import Loss, Losses, place_in
 from replay.sources.mcap_file import McapFile
 from replay.sources.mcap_scan import Scan
 from replay.sources.memory import MOST_BYTES
@@ -182,7 +182,7 @@ class _FilePart:
 
     def _name_losses(self, source: Source) -> None:
         for loss in source.losses.new():
-            self._losses.add(replace(loss, place=f"{self.name}: {loss.place}"))
+            self._losses.add(replace(loss, place=place_in(self.name, loss.place)))
 
     def _source(self, plain: Path, *, is_whole: bool) -> Source:
         head = head_of(plain)
