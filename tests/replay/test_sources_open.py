@@ -54,6 +54,27 @@ def test_empty_file(tmp_path: Path) -> None:
     refused(_written(tmp_path / "a.bag", b""), "is empty")
 
 
+@pytest.mark.parametrize(
+    ("beginning", "kind"),
+    [
+        (b"\x89MCAP0\r\n", "an MCAP file"),
+        (b"#ROSBAG V", "a ROS 1 bag"),
+        (b"SQLite format 3\0", "a .db3 file"),
+        (b"\x28\xb5\x2f\xfd", "zstd"),
+    ],
+)
+def test_files_that_are_cut_off_at_once(tmp_path: Path, beginning: bytes, kind: str) -> None:
+    for length in range(1, len(beginning)):
+        shown = f"cut off after {length} byte{'s' if length > 1 else ''}, "
+        refused(_written(tmp_path / "a", beginning[:length]), shown, kind, "copy it again")
+
+
+@pytest.mark.parametrize("length", [1, 100, 10_000])
+def test_files_that_were_never_written(tmp_path: Path, length: int) -> None:
+    refused(_written(tmp_path / "a", bytes(length)), f"begins with {min(length, 4096)} byte", "zero", "full disk")
+    refused(_written(tmp_path / "b", zstandard.compress(bytes(length))), "zero", "full disk")
+
+
 def test_folder_that_is_no_bag(tmp_path: Path) -> None:
     refused(tmp_path, "no ROS 2 bag", "metadata.yaml")
 
