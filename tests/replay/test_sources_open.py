@@ -144,6 +144,18 @@ def test_permission_denied(tmp_path: Path, name: str, monkeypatch: pytest.Monkey
     refused(path, "permission denied")
 
 
+def test_the_folder_that_may_not_be_entered_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By hand, as above; it is not the file in it that has to be made readable."""
+    path = bags.write_rosbag2(tmp_path / "bag")
+
+    def denied(self: Path, *_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setattr(Path, "open", denied)
+    monkeypatch.setattr(os, "access", lambda asked, _: Path(asked) != path)
+    assert refused(path).startswith(f"{path}: permission to enter this folder denied; ")
+
+
 @pytest.mark.parametrize("head", [b"\x89MCAP0\n", b"\x89MCAP0\r\r\n", b"\xef\xbf\xbdMCAP0\r\n", b"#ROSBAG V2.0\r\n"])
 def test_converted_line_endings_in_the_first_line(tmp_path: Path, head: bytes) -> None:
     refused(_written(tmp_path / "a", head + bytes(200)), "text mode", "binary mode")
