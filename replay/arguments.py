@@ -241,9 +241,9 @@ def _output_arguments(parser: argparse.ArgumentParser) -> None:
     rules.add_argument(
         "--max-memory",
         metavar="SIZE",
-        help="skip maps, and refuse placements, for which a robot's map or the merged map would by itself need more memory "
-        "than this, such as 2GiB or 500MB, and what of a recording is larger to read at once (default: any map, merged maps "
-        "of up to 10⁹ cells, and chunks and messages of up to 1 GiB)",
+        help="skip maps, and refuse placements, for which a robot's map or the merged map would by itself need more "
+        "memory than this, such as 2GiB or 500MB, and what of a recording is larger to read at once (default: any map, "
+        "merged maps of up to 10⁹ cells, and chunks and messages of up to 1 GiB)",
     )
     rules.add_argument("--strict", action="store_true", help="end with an error at the first message that is unusable")
     rules.add_argument(

@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from replay.errors import InputError
 from replay.skip_cause import SkipCause
@@ -18,6 +17,7 @@ from replay.sources.mcap_file import McapFile
 from replay.sources.memory import MOST_BYTES
 from replay.sources.rosbag1 import Rosbag1File
 from replay.sources.sqlite3_file import Sqlite3File
+from replay.sources.temporary import temporary_folder
 from replay.sources.zstd import MAGIC, ZstdError, decompress_file
 
 # of MCAP files, .db3 files and ROS 1 bags
@@ -73,8 +73,7 @@ def plain_copy(path: Path, stack: ExitStack) -> tuple[Path, bool]:
     """Return a file, or a copy of what it decompresses to, there as long as the stack; whether it was whole."""
     if not head_of(path).startswith(MAGIC):
         return path, True
-    folder = Path(stack.enter_context(TemporaryDirectory(prefix="replay-")))
-    plain = folder / path.name.removesuffix(".zstd").removesuffix(".zst")
+    plain = stack.enter_context(temporary_folder()) / path.name.removesuffix(".zstd").removesuffix(".zst")
     return plain, decompress_file(path, plain, _BEGINNINGS)
 
 

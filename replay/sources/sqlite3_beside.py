@@ -11,12 +11,12 @@ import struct
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from replay.errors import InputError
 from replay.skip_cause import SkipCause
 from replay.sources.losses import Loss, Losses
 from replay.sources.sqlite3_salvage import read_header
+from replay.sources.temporary import temporary_folder
 
 WAL, JOURNAL = "-wal", "-journal"
 
@@ -59,7 +59,7 @@ def beside(path: Path) -> dict[str, Path]:
 
 def copied(path: Path, found: dict[str, Path], stack: ExitStack) -> Path:
     """Return a copy of a file with what is beside it, that is there as long as the stack."""
-    folder = Path(stack.enter_context(TemporaryDirectory(prefix="replay-")))
+    folder = stack.enter_context(temporary_folder())
     for each in (path, *found.values()):
         shutil.copyfile(each, folder / each.name)
     return folder / path.name

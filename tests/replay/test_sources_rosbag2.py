@@ -392,7 +392,7 @@ def test_copies_of_compressed_parts_are_there_only_while_they_are_read(tmp_path:
     with open_source(_bag(tmp_path / "bag", *parts)) as source:
         assert list(temporary.iterdir()) == []
         for message in source.messages(["/r1/map"]):
-            copies = sorted(file.name for file in temporary.glob("*/*"))
+            copies = sorted(file.name for file in temporary.glob("*/copies/*"))
             counts.append(((message.log_time_ns - START) // SECOND, [name[5] for name in copies]))
             assert len(list(temporary.iterdir())) == len(copies)
         assert list(temporary.iterdir()) == []
