@@ -36,6 +36,19 @@ exit status: 0 done; 1 a robot was not merged and --require-all was given; 2 bad
 3 an output could not be written, or a bug; 130 interrupted
 """
 
+_INFO_STATUS = """\
+exit status: 0 listed, also where nothing would be merged or something is lost; 2 bad usage, or an input that cannot be
+read at all; 3 the list could not be written, or a bug; 130 interrupted
+"""
+
+_RECOVER_STATUS = """\
+An MCAP, bag or .db3 that was cut off or is damaged can be given to `replay merge` as it is: it uses all whole messages.
+What is recovered is for other programs.
+
+exit status: 0 written, also where something is left out; 2 bad usage, or nothing can be recovered; 3 the new MCAP could
+not be written, or a bug; 130 interrupted
+"""
+
 
 class _Help(argparse.RawDescriptionHelpFormatter):
     """Help that reads the same in every version of Python: docs/cli.md is checked against it."""
@@ -78,6 +91,7 @@ def parser() -> argparse.ArgumentParser:
         usage="replay info RUN [RUN ...] [options]",
         description="List format, duration, map topics, messages, sizes and resolutions of recordings,\n"
         "and what would be merged.",
+        epilog=_INFO_STATUS,
         formatter_class=_Help,
         allow_abbrev=False,
     )
@@ -93,6 +107,7 @@ def _recover_command(commands: argparse._SubParsersAction[argparse.ArgumentParse
         usage="replay recover FILE [options]",
         description="Write what is whole of an MCAP that was cut off to a new one: of OUT.mcap.partial, which a "
         "run\nthat was killed left, or of any other recorder's. FILE is only read.",
+        epilog=_RECOVER_STATUS,
         formatter_class=_Help,
         allow_abbrev=False,
     )
@@ -226,9 +241,9 @@ def _output_arguments(parser: argparse.ArgumentParser) -> None:
     rules.add_argument(
         "--max-memory",
         metavar="SIZE",
-        help="skip maps, and refuse placements, for which a robot's map or the merged map would need more memory than "
-        "this, such as 2GiB or 500MB, and what of a recording is larger to read at once (default: any map, merged maps "
-        "of up to 10⁹ cells, and chunks and messages of up to 1 GiB)",
+        help="skip maps, and refuse placements, for which a robot's map or the merged map would by itself need more "
+        "memory than this, such as 2GiB or 500MB, and what of a recording is larger to read at once (default: any map, "
+        "merged maps of up to 10⁹ cells, and chunks and messages of up to 1 GiB)",
     )
     rules.add_argument("--strict", action="store_true", help="end with an error at the first message that is unusable")
     rules.add_argument(

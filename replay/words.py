@@ -33,10 +33,11 @@ def lost(messages: int | None) -> str:
     return "lost messages" if messages is None else f"lost {counted(messages, 'message')}"
 
 
-def recovered(name: str, messages: int, until_ns: int | None) -> str:
-    """Return what was read of a recording that ends early."""
+def recovered(name: str, messages: int, until_ns: int | None, parts: Sequence[str] = ()) -> str:
+    """Return what was read of a recording that ends early, or of which these parts do: there may be more after them."""
     until = f" up to {moment(until_ns)}" if until_ns is not None else ""
-    return f"{name}: recovered {counted(messages, 'message')}{until}; the file ends early"
+    ending = f"{listed(parts)} {'ends' if len(parts) == 1 else 'end'}" if parts else "the file ends"
+    return f"{name}: recovered {counted(messages, 'message')}{until}; {ending} early"
 
 
 def moment(time_ns: int) -> str:

@@ -20,6 +20,19 @@ DESCRIPTORS = Path("/dev/fd")
 """Where open files have paths, if the system has that."""
 _ATTEMPTS = 100
 _FLAGS = os.O_RDWR | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
+_ELSEWHERE = "give another --output"
+_NO_SPACE = f"free space there, or {_ELSEWHERE}"
+_NO_RIGHT = f"make the folder one that you may write to, or {_ELSEWHERE}"
+_REMEDIES = {
+    errno.ENOSPC: _NO_SPACE,
+    errno.EDQUOT: _NO_SPACE,
+    errno.EFBIG: f"raise the limit (`ulimit -f`), or {_ELSEWHERE}",
+    errno.EACCES: _NO_RIGHT,
+    errno.EPERM: _NO_RIGHT,
+    errno.EROFS: _NO_RIGHT,
+    errno.EISDIR: f"remove that folder, or {_ELSEWHERE}",
+    errno.EMFILE: "raise the limit (`ulimit -n`)",
+}
 _NO_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS}
 
 
@@ -212,11 +225,18 @@ def output_errors(path: Path, *foreign: type[Exception]) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror or one_line(error)}") from error
+        raise OutputError(f"{path}: cannot be written: {_with_remedy(error)}") from error
     except MemoryError as error:
         raise OutputError(f"{path}: cannot be written: there is not enough memory") from error
     except foreign as error:
         raise OutputError(f"{path}: cannot be written: {one_line(error)}") from error
+
+
+def _with_remedy(error: OSError) -> str:
+    """Return what the system says, and what to do; what we say ourselves says that already."""
+    if error.errno is None or error.strerror != os.strerror(error.errno):
+        return error.strerror or one_line(error)
+    return f"{error.strerror}; {_REMEDIES.get(error.errno, _ELSEWHERE)}"
 
 
 def one_line(error: BaseException) -> str:

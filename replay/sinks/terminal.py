@@ -13,6 +13,8 @@ from replay.decisions import decisions
 from replay.events import Event, Merged, Noted, Report, Skipped, Started
 from replay.options import NS_PER_S
 from replay.plain_text import plain
+from replay.skip_cause import SkipCause
+from replay.sources.losses import part_of
 from replay.standard_streams import quiet_stderr
 from replay.words import counted, intention, lost, recovered, unused
 
@@ -120,8 +122,13 @@ class Narrator:
     def sum_up(self, report: Report, paths: Sequence[str]) -> None:
         """Say what was skipped, how long it took, and what was written."""
         for item in report["inputs"]:
-            if any(each["cause"] == "ends_early" and each["input"] == item["name"] for each in report["skipped_at"]):
-                self.say(recovered(item["name"], item["messages"], item["until_ns"]))
+            early = [each for each in report["skipped_at"] if _ends_early(each) and each["input"] == item["name"]]
+            if early:
+                parts = list(dict.fromkeys(part for each in early if (part := part_of(each["place"]))))
+                self.say(recovered(item["name"], item["messages"], item["until_ns"], parts))
+        for cause, number in self._skipped.items():
+            if number > _SKIPPED_NAMED:
+                self.say(f"and {number - _SKIPPED_NAMED} more of {cause}: the report lists them under skipped_at")
         skipped, late = sum(report["skipped"].values()), sum(item["late"] for item in report["inputs"])
         if skipped:
             causes = ", ".join(f"{count} {cause}" for cause, count in report["skipped"].items())
@@ -153,6 +160,10 @@ class Narrator:
 
     def discard(self) -> None:
         """Do nothing."""
+
+
+def _ends_early(skipped: Report) -> bool:
+    return bool(skipped["cause"] == SkipCause.ENDS_EARLY)
 
 
 def open_notes() -> Console:

@@ -14,6 +14,7 @@ from typing import Protocol, cast
 
 from replay.errors import InputError
 from replay.sources.base import Source
+from replay.sources.beginnings import HEAD_BYTES, nothing_there
 from replay.sources.boundary import translated
 from replay.sources.memory import MOST_BYTES
 
@@ -28,7 +29,6 @@ SOURCES: dict[str, str] = {
     "map_server": "replay.sources.map_server:SavedMap",
 }
 
-_HEAD_BYTES = 4096
 # Of all outputs together, of the Rerun library's threads (which abort the program if there are none), and of imports.
 _SPARE_FILES = 16
 # Its parts are opened when they are due: one, and a copy of it.
@@ -113,9 +113,9 @@ def _head(path: Path) -> bytes:
     if not path.is_file():
         raise InputError(f"{path}: this is no regular file; expected {_EXPECTED}")
     with path.open("rb") as file:
-        head = file.read(_HEAD_BYTES)
+        head = file.read(HEAD_BYTES)
     if not head:
-        raise InputError(f"{path}: the file is empty (0 bytes); expected {_EXPECTED}: copy it again")
+        raise InputError(f"{path}: {nothing_there(head)}")
     return head
 
 
@@ -127,4 +127,7 @@ def _unknown(path: Path, head: bytes) -> str:
     for magics, hint in _OTHERS:
         if head.startswith(magics):
             return f"{path}: this is no recording, {hint}"
+    found = nothing_there(head)
+    if found:
+        return f"{path}: {found}"
     return f"{path}: this is no recording that can be read: it begins with {head[:8]!r}; expected {_EXPECTED}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,6 +26,8 @@ TEXT_MODE = (
     "as after a transfer in text mode, which converts line endings: copy it again in binary mode"
     " (Git: mark it `binary` in .gitattributes)"
 )
+
+COPY_AGAIN = "copy it again if there is a whole one"
 
 _NO_SPACE = "free space in the temporary folder, or name another in the environment variable TMPDIR"
 # The machine's limits, which say nothing about the recording.
@@ -57,7 +60,7 @@ def translated(path: Path, foreign: tuple[type[Exception], ...] = COMMON, *, par
 
 def _line(path: Path, error: Exception, part: str) -> str:
     if isinstance(error, PermissionError):
-        return f"{error.filename or path}: permission denied; make it readable for you and try again"
+        return f"{_forbidden(path, error)}; make it readable for you and try again"
     if isinstance(error, MemoryError):
         what = f"{part} takes" if part else "it takes"
         return f"{path}: {what} more memory than there is; close other programs, or give a smaller --max-memory"
@@ -69,6 +72,14 @@ def _line(path: Path, error: Exception, part: str) -> str:
     found = f"{name}: {text}" if text else name
     what = f"{part} cannot be read" if part else "it cannot be read"
     return f"{path}: {what} ({found}); the recording is damaged or incomplete: copy it again from where it was made"
+
+
+def _forbidden(path: Path, error: PermissionError) -> str:
+    """Return what may not be read: a file, or the outermost folder around it that may not be entered."""
+    found = Path(os.fsdecode(error.filename)) if isinstance(error.filename, str | bytes) else path
+    # unlike Path's own this one is False of what lies in a closed folder
+    closed = [folder for folder in found.parents if os.path.isdir(folder) and not os.access(folder, os.X_OK)]  # noqa: PTH112
+    return f"{closed[-1]}: permission to enter this folder denied" if closed else f"{found}: permission denied"
 
 
 class Closing:

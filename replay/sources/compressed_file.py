@@ -6,20 +6,20 @@ from collections.abc import Collection, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from replay.errors import InputError
 from replay.skip_cause import SkipCause
 from replay.sources.base import RawMessage, Source, SourceInfo
+from replay.sources.beginnings import HEAD_BYTES, nothing_there
 from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.losses import Loss
 from replay.sources.mcap_file import McapFile
 from replay.sources.memory import MOST_BYTES
 from replay.sources.rosbag1 import Rosbag1File
 from replay.sources.sqlite3_file import Sqlite3File
+from replay.sources.temporary import temporary_folder
 from replay.sources.zstd import MAGIC, ZstdError, decompress_file
 
-_HEAD_BYTES = 16
 # of MCAP files, .db3 files and ROS 1 bags
 _BEGINNINGS = (b"\x89MCAP", b"SQLite", b"#ROSBAG")
 
@@ -66,15 +66,14 @@ class CompressedFile(Closing):
 def head_of(path: Path) -> bytes:
     """Return how a file begins."""
     with path.open("rb") as file:
-        return file.read(_HEAD_BYTES)
+        return file.read(HEAD_BYTES)
 
 
 def plain_copy(path: Path, stack: ExitStack) -> tuple[Path, bool]:
     """Return a file, or a copy of what it decompresses to, there as long as the stack; whether it was whole."""
     if not head_of(path).startswith(MAGIC):
         return path, True
-    folder = Path(stack.enter_context(TemporaryDirectory(prefix="replay-")))
-    plain = folder / path.name.removesuffix(".zstd").removesuffix(".zst")
+    plain = stack.enter_context(temporary_folder()) / path.name.removesuffix(".zstd").removesuffix(".zst")
     return plain, decompress_file(path, plain, _BEGINNINGS)
 
 
@@ -103,6 +102,9 @@ def _opened(plain: Path, path: Path, most_bytes: int, *, is_whole: bool) -> Sour
         return Rosbag1File(plain, path, most_bytes)
     if not is_whole:
         raise too_early(path)
+    found = nothing_there(head)
+    if found:
+        raise InputError(f"{path}: decompressed, {found}")
     raise InputError(
         f"{path}: it is compressed with zstd, and what is in it is no recording: it begins with {head[:8]!r}; expected "
         "a ROS 1 bag, an MCAP file or a .db3 file: decompress it with `zstd -d` to see what it is"

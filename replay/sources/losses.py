@@ -45,6 +45,16 @@ OTHER_PLACES = "other places"
 """What stands for the places that are not listed."""
 
 
+def place_in(part: str, place: str) -> str:
+    """Return where something is in a recording that consists of several files."""
+    return f"{part}: {place}"
+
+
+def part_of(place: str) -> str:
+    """Return the file that a place names; "" if the recording is one file."""
+    return place.rpartition(": ")[0]
+
+
 class Listing:
     """Chooses the places that are listed: the first few of each topic, and of all topics of one kind of loss."""
 

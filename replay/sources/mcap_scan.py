@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from replay.skip_cause import SkipCause
+from replay.sources.boundary import COPY_AGAIN
 from replay.sources.losses import Loss
 from replay.sources.mcap_chunk import (
     BadPart,
@@ -373,9 +374,12 @@ def _damaged(start: int, stop: int, detail: str, messages: int | None = None) ->
 
 
 def _ends_early(end: int, file: RecordFile) -> Loss:
+    name = file.path.name
+    # what a run of ours left is the only one
+    remedy = f"finish it with `replay recover {name}`" if name.endswith(".partial") else COPY_AGAIN
     detail = (
         f"the last whole record ends there, {counted(file.size - end, 'byte')} before the end of the file, and nothing "
-        "closes the recording, as when recording or copying was cut off; copy it again if there is a whole one"
+        f"closes the recording, as when recording or copying was cut off; {remedy}"
     )
     return Loss(SkipCause.ENDS_EARLY, f"byte {end}", detail)
 

@@ -11,7 +11,7 @@ from replay.errors import InputError
 from replay.plain_text import brief
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE, RawMessage, SourceInfo
-from replay.sources.boundary import COMMON, TEXT_MODE, Closing, translated
+from replay.sources.boundary import COMMON, COPY_AGAIN, TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
 from replay.sources.definitions import differing_field
 from replay.sources.losses import Loss, Losses
@@ -25,6 +25,7 @@ from replay.sources.topics import topic_table
 _MAGIC = b"#ROSBAG V"
 _MAGIC_BEFORE_2_0 = b"#ROSRECORD V"
 _MAGIC_2_0 = b"#ROSBAG V2.0\n"
+_UNFINISHED = "it has no index, because its recording was not ended properly"
 _DECODED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 # So many CR bytes, each followed by LF by chance once in 256, come without a single CR LF in 2 of 100 files.
 _TELLING_CR_COUNT = 1000
@@ -119,17 +120,16 @@ class Rosbag1File(Closing):
                 return self._scanned(str(error), is_ended=error.is_cut)
         if header is None:
             return self._scanned("its header is damaged")
-        if file.index_pos:
-            reason = f"its index should begin at byte {file.index_pos}"
-        else:
-            reason = "it has no index, because its recording was not ended properly"
+        reason = f"its index should begin at byte {file.index_pos}" if file.index_pos else _UNFINISHED
         return self._scanned(reason, is_ended=True)
 
     def _scanned(self, reason: str, *, is_ended: bool = False) -> Scan:
         """Return what a pass through the file finds, and name why it is made."""
         scan = Scan(self._file, self.losses, self._most_bytes)
         if is_ended or scan.is_cut:
-            detail = f"the file ends early: {reason}"
+            # of one that was never whole there is no other copy
+            remedy = "" if reason == _UNFINISHED else f"; {COPY_AGAIN}"
+            detail = f"the file ends early: {reason}{remedy}"
             self.losses.add(Loss(SkipCause.ENDS_EARLY, f"byte {self._file.size}", detail, scan.lost_at_end))
         else:
             cause = f"{reason}; the file holds not one CR LF, {TEXT_MODE}" if self._lost_line_endings() else reason

@@ -13,9 +13,10 @@ from typing import Protocol
 from replay.errors import InputError
 from replay.skip_cause import SkipCause
 from replay.sources.base import RawMessage, Source, SourceInfo
+from replay.sources.beginnings import nothing_there
 from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.compressed_file import head_of, name_early_end, plain_copy, too_early
-from replay.sources.losses import Loss, Losses
+from replay.sources.losses import Loss, Losses, place_in
 from replay.sources.mcap_file import McapFile
 from replay.sources.mcap_scan import Scan
 from replay.sources.memory import MOST_BYTES
@@ -182,7 +183,7 @@ class _FilePart:
 
     def _name_losses(self, source: Source) -> None:
         for loss in source.losses.new():
-            self._losses.add(replace(loss, place=f"{self.name}: {loss.place}"))
+            self._losses.add(replace(loss, place=place_in(self.name, loss.place)))
 
     def _source(self, plain: Path, *, is_whole: bool) -> Source:
         head = head_of(plain)
@@ -192,6 +193,9 @@ class _FilePart:
             return Sqlite3File(plain, self._path, self._most_bytes)
         if not is_whole:
             raise too_early(self._path)
+        found = nothing_there(head)
+        if found:
+            raise InputError(f"{self._path}: {found}")
         raise InputError(
             f"{self._path}: this part of a ROS 2 bag is neither MCAP nor SQLite; copy it again from where it was made"
         )

@@ -9,7 +9,6 @@ import shutil
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from replay.skip_cause import SkipCause
 from replay.sources.losses import Loss, Losses
@@ -17,6 +16,7 @@ from replay.sources.sqlite3_journal import read_journal
 from replay.sources.sqlite3_log import PageLog
 from replay.sources.sqlite3_salvage import read_header
 from replay.sources.sqlite3_wal import read_wal
+from replay.sources.temporary import temporary_folder
 
 _WAL, _JOURNAL = "-wal", "-journal"
 # in the order in which SQLite uses them
@@ -77,7 +77,7 @@ def _with(plain: Plain, log: PageLog, log_path: Path, stack: ExitStack) -> Plain
     is_consistent = plain.is_consistent and log.is_whole
     if not log.pages:
         return Plain(plain.path, plain.pages, is_consistent)
-    folder = Path(stack.enter_context(TemporaryDirectory(prefix="replay-")))
+    folder = stack.enter_context(temporary_folder())
     copy = folder / plain.path.name
     shutil.copyfile(plain.path, copy)
     has_all = log.put_into(copy, log_path)

@@ -16,6 +16,7 @@ import pytest
 
 from replay.events import Finished
 from replay.pipeline import drain
+from replay.sinks.partial_file import PartialFile
 from tests.bags import write_bare_db3, write_mcap, write_rosbag2, write_saved_map
 from tests.disks import read_only, small_disk
 from tests.program import Program
@@ -256,6 +257,32 @@ class TestInputsAreNeverWritten:
 
 
 class TestWhereNothingCanBeWritten:
+    @pytest.mark.parametrize(
+        ("number", "remedy"),
+        [
+            (errno.EACCES, "make the folder one that you may write to"),
+            (errno.EROFS, "make the folder one that you may write to"),
+            (errno.ENOSPC, "free space"),
+            (errno.EDQUOT, "free space"),
+            (errno.EFBIG, "`ulimit -f`"),
+            (errno.EIO, "give another --output"),
+        ],
+    )
+    def test_it_is_said_what_to_do(
+        self, replay: Program, two: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, remedy: str
+    ) -> None:
+        """By hand, because the owner of a container may write everywhere."""
+
+        def refused(*_: object) -> bool:
+            raise OSError(number, os.strerror(number))
+
+        monkeypatch.setattr(PartialFile, "_make", refused)
+        ran = replay.merge(two)
+        assert ran.status == 3
+        assert ran.error.startswith(f"{tmp_path / 'out.mcap'}: cannot be written: {os.strerror(number)}; ")
+        assert remedy in ran.error
+        assert "--output" in ran.error
+
     def test_no_folder(self, replay: Program, two: Path, tmp_path: Path) -> None:
         ran = replay("merge", two, "-o", "nowhere/out.mcap", "--no-rrd")
         assert ran.status == 3
@@ -269,6 +296,7 @@ class TestWhereNothingCanBeWritten:
         ran = replay("merge", two, "-o", folder / "out.mcap", "--no-rrd")
         assert ran.status == 3
         assert f"{folder}/out.mcap: cannot be written" in ran.error
+        assert ran.error.endswith("; give another --output")
 
     def test_a_folder_that_becomes_read_only(
         self, replay: Program, two: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -287,6 +315,7 @@ class TestWhereNothingCanBeWritten:
             ran = replay("merge", two, "-o", out / "out.mcap", "--force", "--images", "none")
             assert ran.status == 3
             assert "cannot be written: " in ran.err.splitlines()[-1]
+            assert ran.err.endswith("; make the folder one that you may write to, or give another --output\n")
             assert not {"out.mcap", "out.rrd"} & set(names(out))
             assert (out / "out.json").read_text() == "of an earlier run"
 
@@ -342,7 +371,9 @@ class TestWhereNothingCanBeWritten:
                 statuses.append(ran.status)
                 if ran.status:
                     assert ran.err.splitlines()[-1].startswith(f"replay: error: {disk}/out.")
-                    assert ran.err.endswith("cannot be written: No space left on device\n")
+                    assert ran.err.endswith(
+                        "written: No space left on device; free space there, or give another --output\n"
+                    )
                     assert not names(disk)
         assert statuses == [3, 3, 3, 0]
 

@@ -54,6 +54,27 @@ def test_empty_file(tmp_path: Path) -> None:
     refused(_written(tmp_path / "a.bag", b""), "is empty")
 
 
+@pytest.mark.parametrize(
+    ("beginning", "kind"),
+    [
+        (b"\x89MCAP0\r\n", "an MCAP file"),
+        (b"#ROSBAG V", "a ROS 1 bag"),
+        (b"SQLite format 3\0", "a .db3 file"),
+        (b"\x28\xb5\x2f\xfd", "zstd"),
+    ],
+)
+def test_files_that_are_cut_off_at_once(tmp_path: Path, beginning: bytes, kind: str) -> None:
+    for length in range(1, len(beginning)):
+        shown = f"cut off after {length} byte{'s' if length > 1 else ''}, "
+        refused(_written(tmp_path / "a", beginning[:length]), shown, kind, "copy it again")
+
+
+@pytest.mark.parametrize("length", [1, 100, 10_000])
+def test_files_that_were_never_written(tmp_path: Path, length: int) -> None:
+    refused(_written(tmp_path / "a", bytes(length)), f"begins with {min(length, 4096)} byte", "zero", "full disk")
+    refused(_written(tmp_path / "b", zstandard.compress(bytes(length))), "zero", "full disk")
+
+
 def test_folder_that_is_no_bag(tmp_path: Path) -> None:
     refused(tmp_path, "no ROS 2 bag", "metadata.yaml")
 
@@ -121,6 +142,18 @@ def test_permission_denied(tmp_path: Path, name: str, monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(Path, "open", denied)
     refused(path, "permission denied")
+
+
+def test_the_folder_that_may_not_be_entered_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By hand, as above; it is not the file in it that has to be made readable."""
+    path = bags.write_rosbag2(tmp_path / "bag")
+
+    def denied(self: Path, *_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setattr(Path, "open", denied)
+    monkeypatch.setattr(os, "access", lambda asked, _: Path(asked) != path)
+    assert refused(path).startswith(f"{path}: permission to enter this folder denied; ")
 
 
 @pytest.mark.parametrize("head", [b"\x89MCAP0\n", b"\x89MCAP0\r\r\n", b"\xef\xbf\xbdMCAP0\r\n", b"#ROSBAG V2.0\r\n"])

@@ -104,6 +104,23 @@ def test_the_chunk_that_a_recorder_had_begun_has_no_length_yet(tmp_path: Path, c
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_of_a_chunk_without_a_length_all_that_can_be_decompressed_is_read(tmp_path: Path, compression: str) -> None:
+    """rosbag names the compression when it begins a chunk, and fills in both lengths when it ends it."""
+    path = _with_index_pos(_small(tmp_path / "a.bag", compression), 0)
+    data, chunks = bytearray(path.read_bytes()), bags_chunks(path)
+    last = chunks[-1]
+    whole = bytes(data)
+    data[last.length : last.data] = bytes(4)
+    data[last.size : last.size + 4] = bytes(4)
+    cut = tmp_path / "cut.bag.active"
+    for length in {*range(last.data, last.end, 7), last.end}:
+        cut.write_bytes(data[:length])
+        found, losses = _read(cut)
+        assert found == [each for chunk in chunks for each in chunk.messages_within(whole, length, compression)], length
+        assert _causes(losses) == {"ends_early"}
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
 def test_of_a_truncated_bag_every_whole_message_is_read(tmp_path: Path, compression: str) -> None:
     """At every byte: of uncompressed chunks each message that is there, of others what can be decompressed."""
     path = _small(tmp_path / "a.bag", compression)

@@ -182,7 +182,7 @@ def test_a_compressed_part_that_is_no_recording_is_not_decompressed_to_its_end(t
     (part,) = path.glob("*.zstd")
     part.write_bytes(zstd.compress(bytes(1 << 26)))
     with files_up_to(1 << 22):
-        refused(path, part.name, "neither MCAP nor SQLite")
+        refused(path, part.name, "begins with 4096 bytes that are all zero")
 
 
 def test_a_compressed_part_that_grows_beyond_what_a_file_may_have(tmp_path: Path) -> None:
@@ -290,6 +290,19 @@ def test_a_part_that_is_no_recording_is_left_out(tmp_path: Path) -> None:
     assert _read(path) == (_recorded(_without(2)), [("damaged", "bag_7.db3", None)])
 
 
+@pytest.mark.parametrize(("content", "words"), [(b"", "is empty"), (bytes(9999), "zero"), (b"SQL", "after 3 bytes")])
+@pytest.mark.parametrize("compression", ["none", "file"])
+def test_a_part_with_nothing_in_it_is_called_that(tmp_path: Path, content: bytes, words: str, compression) -> None:
+    """As a full disk leaves the last part: to call it no recording says nothing of why."""
+    path = bags.write_split_rosbag2(tmp_path / "bag", compression=compression)
+    (part,) = path.glob("bag_7.*")
+    part.write_bytes(zstd.compress(content) if compression == "file" else content)
+    assert _read(path) == (_recorded(_without(2)), [("damaged", part.name, None)])
+    with open_source(path) as source:
+        assert words in source.losses.all[0].detail
+        assert "neither" not in source.losses.all[0].detail
+
+
 def test_the_only_part_is_no_recording(tmp_path: Path) -> None:
     path = bags.write_rosbag2(tmp_path / "bag")
     (path / "bag.db3").write_bytes(b"something else")
@@ -394,7 +407,7 @@ def test_copies_of_compressed_parts_are_there_only_while_they_are_read(tmp_path:
     with open_source(_bag(tmp_path / "bag", *parts)) as source:
         assert list(temporary.iterdir()) == []
         for message in source.messages(["/r1/map"]):
-            copies = sorted(file.name for file in temporary.glob("*/*"))
+            copies = sorted(file.name for file in temporary.glob("*/copies/*"))
             counts.append(((message.log_time_ns - START) // SECOND, [name[5] for name in copies]))
             assert len(list(temporary.iterdir())) == len(copies)
         assert list(temporary.iterdir()) == []
