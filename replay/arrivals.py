@@ -125,7 +125,7 @@ def in_order(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
     for number, arrival in enumerate(_stamped(feed, tally, window)):
         stamp = arrival.stamp_ns
         if released_ns is not None and stamp < released_ns:
-            tally.late += 1
+            tally.late += not isinstance(arrival.content, Skipped | Noted)  # which are not taken in at all
             arrival = replace(arrival, stamp_ns=released_ns)  # noqa: PLW2901
         newest_ns = stamp if newest_ns is None else max(newest_ns, stamp)
         heapq.heappush(held, (arrival.stamp_ns, number, arrival))
@@ -240,7 +240,6 @@ class _Times:
     def _guessed(self, raw: RawMessage) -> int:
         if raw.topic in self._leads_ns:
             return max(0, raw.log_time_ns + self._leads_ns[raw.topic])
-        self._tally.late += 1
         return self.newest_ns
 
 

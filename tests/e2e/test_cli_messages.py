@@ -235,6 +235,7 @@ class TestBadMessages:
         found = ran.robots["r2"]
         assert (found["status"], found["reason"]["code"], found["updates"]) == ("no_map", "no_map", 0)
         assert (found["map_topic"], found["map_frame"]) == ("/r2/map", "r2/map")
+        assert ran.report["inputs"][0]["late"] == 0
         assert "messages are skipped: 1 bad_origin, 1 bad_resolution, 1 empty" in found["reason"]["message"]
         assert [ran.robots["r1"]["updates"], len(maps(ran.mcap))] == [3, 3]
 
