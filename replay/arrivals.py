@@ -19,6 +19,7 @@ from replay.errors import BadMessage
 from replay.events import Clock, Noted, Skipped
 from replay.footprint import MemoryLimit
 from replay.messages import GridMessage, TransformMessage, UpdateMessage
+from replay.odd_cells import OddCells
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, RawMessage, Source
 from replay.stamps import Stamp, StampCheck
@@ -140,11 +141,14 @@ def _stamped(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
     """Decode a recording's messages and give each its time on the reference's clock."""
     times = _Times(feed, tally)
     before = _Before()
+    odd_cells = OddCells(feed.source.path.name)
     for raw in feed.source.messages(tuple(feed.robot_of)):
         yield from _lost(feed, raw.log_time_ns, times.newest_ns)
         content = _decoded(feed, raw)
         time_ns = times.of(raw, content)
         yield from (Arrival(time_ns, feed, raw, note) for note in times.new_notes())
+        if (odd := odd_cells.note(raw, content)) is not None:
+            yield Arrival(time_ns, feed, raw, Noted(feed.robot_of[raw.topic], odd))
         early = window.start_ns is not None and time_ns < window.start_ns
         if early and isinstance(content, GridMessage | UpdateMessage):
             tally.count(raw)

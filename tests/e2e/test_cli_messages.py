@@ -16,6 +16,7 @@ from tests.outputs import maps, raw, reports, same_map, transforms
 from tests.program import Program
 from tests.runs import (
     FLOOR_FROM_MAP,
+    at,
     bad_messages,
     bare_room,
     begun_anew,
@@ -124,6 +125,27 @@ def test_a_robot_whose_maps_are_lost_with_a_part_says_so(replay: Program, tmp_pa
     damage(run, first)
     found = replay.merge(run).robots["r2"]["reason"]
     assert found == {"code": "no_map", "message": "no map that can be used yet, and parts of the recording are lost"}
+
+
+def test_cells_that_mean_nothing_are_named_once_a_topic(replay: Program, tmp_path: Path) -> None:
+    cells = flat_map("r2").cells.reshape(-1).copy()
+    cells[:3000] = [101, 127, -128] * 1000  # of 12 000
+    few = flat_map("r1").cells.reshape(-1).copy()
+    few[:20] = 111
+    part = updated("r1", 5.0, 0, 0, np.full((2, 2), -5, np.int8))
+    messages = [seen("r1", 0.0), *(seen("r2", float(second), data=cells) for second in (1, 2, 3)), part]
+    run = write_mcap(tmp_path / "run.mcap", [*messages, seen("r1", 6.0, data=few)])
+    ran = replay.merge(run, "--strict")
+    expected = {
+        ("r2", f"run.mcap: /r2/map at {at(1.0)} ns: 25 %"),
+        ("r1", f"run.mcap: /r1/map_updates at {at(5.0)} ns: 100 %"),
+        ("r1", f"run.mcap: /r1/map at {at(6.0)} ns: less than 1 %"),
+    }
+    words = " of the cells are outside −1 to 100: such cells are taken as unknown"
+    assert len(ran.report["notes"]) == len(expected)
+    assert {(each["robot"], each["message"].removesuffix(words)) for each in ran.report["notes"]} == expected
+    assert ran.err.count(words) == len(expected)
+    assert ran.report["skipped"] == {}
 
 
 def test_metadata_that_cannot_be_read_is_named(replay: Program, tmp_path: Path) -> None:
