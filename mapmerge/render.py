@@ -105,10 +105,18 @@ def _surface(evidence: SurfaceEvidence) -> Rgb:
     grey = cv2.resize(scaled.astype(np.uint8)[::-1], size, interpolation=interpolation)
     image: Rgb = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_VIRIDIS)[:, :, ::-1], np.uint8)
     for row, col in evidence.marks:
-        cv2.circle(image, _pixel(row, col, values.shape, zoom), 9, PAPER, 1, cv2.LINE_AA)
+        _circle(image, _pixel(row, col, values.shape, zoom), 9, PAPER, 1)
     if evidence.chosen is not None:
-        cv2.circle(image, _pixel(*evidence.chosen, values.shape, zoom), 14, MARK, 3, cv2.LINE_AA)
+        _circle(image, _pixel(*evidence.chosen, values.shape, zoom), 14, MARK, 3)
     return titled(image, evidence.title)
+
+
+def _circle(image: Rgb, at: tuple[int, int], radius_px: int, colour: Colour, thickness_px: int) -> None:
+    """Draw a circle, if any of it may be seen: OpenCV takes no numbers of more than 32 bits."""
+    rows, cols = image.shape[:2]
+    reach_px = radius_px + thickness_px
+    if -reach_px <= at[0] < cols + reach_px and -reach_px <= at[1] < rows + reach_px:
+        cv2.circle(image, at, radius_px, colour, thickness_px, cv2.LINE_AA)
 
 
 def _pixel(row: int, col: int, shape: tuple[int, ...], zoom: float) -> tuple[int, int]:

@@ -19,6 +19,7 @@ from replay.errors import BadMessage
 from replay.events import Clock, Noted, Skipped
 from replay.footprint import MemoryLimit
 from replay.messages import GridMessage, TransformMessage, UpdateMessage
+from replay.odd_cells import OddCells
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, RawMessage, Source
 from replay.stamps import LAST_NS, Stamp, StampCheck
@@ -138,7 +139,7 @@ def in_order(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
     for number, arrival in enumerate(_stamped(feed, tally, window)):
         stamp = arrival.stamp_ns
         if released_ns is not None and stamp < released_ns:
-            tally.late += 1
+            tally.late += not isinstance(arrival.content, Skipped | Noted)  # which are not taken in at all
             arrival = replace(arrival, stamp_ns=released_ns)  # noqa: PLW2901
         newest_ns = stamp if newest_ns is None else max(newest_ns, stamp)
         heapq.heappush(held, (arrival.stamp_ns, number, arrival))
@@ -153,6 +154,7 @@ def _stamped(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
     """Decode a recording's messages and give each its time on the reference's clock."""
     times = _Times(feed, tally)
     before = _Before()
+    odd_cells = OddCells(feed.source.path.name)
     for raw in feed.source.messages(tuple(feed.robot_of)):
         yield from _lost(feed, raw.log_time_ns, times.newest_ns)
         content = _decoded(feed, raw)
@@ -160,6 +162,8 @@ def _stamped(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
         if time_ns is None:
             content, time_ns = _skipped(feed, raw, _NO_TIME), times.newest_ns
         yield from (Arrival(time_ns, feed, raw, note) for note in times.new_notes())
+        if (odd := odd_cells.note(raw, content)) is not None:
+            yield Arrival(time_ns, feed, raw, Noted(feed.robot_of[raw.topic], odd))
         early = window.start_ns is not None and time_ns < window.start_ns
         if early and isinstance(content, GridMessage | UpdateMessage):
             tally.count(raw)
@@ -277,7 +281,6 @@ class _Times:
             return None
         if raw.topic in self._leads_ns:
             return min(max(0, raw.log_time_ns + self._leads_ns[raw.topic]), LAST_NS)
-        self._tally.late += 1
         return self.newest_ns
 
 

@@ -66,6 +66,8 @@ class RunSummary:
     ----------
     robots
         Robot and topic, the reference first; empty if nothing would be merged.
+    mapless
+        Those of these robots of which no map can be used, with their topics.
     unused
         Map topics that are no robot's.
     problem
@@ -74,6 +76,7 @@ class RunSummary:
 
     inputs: tuple[InputSummary, ...]
     robots: tuple[tuple[str, str], ...]
+    mapless: tuple[tuple[str, str], ...]
     unused: tuple[str, ...]
     problem: str | None
 
@@ -91,11 +94,12 @@ def summarise(options: RunOptions) -> RunSummary:
     try:
         with open_plan(options) as plan:
             robots = tuple((item.robot, item.topic) for item in plan.robots)
+            mapless = tuple(item for item in robots if item[0] not in plan.mapped)
             # who names the robots knows that others are left out
             left_out = tuple(plan.unused_topics()) if options.robots is None else ()
-            return RunSummary(inputs, robots, left_out, None)
+            return RunSummary(inputs, robots, mapless, left_out, None)
     except ReplayError as error:
-        return RunSummary(inputs, (), (), str(error))
+        return RunSummary(inputs, (), (), (), str(error))
 
 
 def _input(source: Source) -> InputSummary:
@@ -157,9 +161,23 @@ def lines(summary: RunSummary) -> Iterator[str]:
     if summary.problem is not None:
         yield f"nothing would be merged: {summary.problem}"
         return
-    yield intention([f"{robot} ({topic})" for robot, topic in summary.robots], "would be merged: {} into {}")
+    yield _intended(summary)
     if summary.unused:
         yield unused(summary.unused)
+
+
+def _intended(summary: RunSummary) -> str:
+    """Return what would be merged, and of which robots there is nothing to merge."""
+    mapless = f"no map of {listed(_named(summary.mapless))} can be used" if summary.mapless else ""
+    there = [item for item in summary.robots if item not in summary.mapless]
+    if summary.mapless and (len(there) == 1 or summary.robots[0] in summary.mapless):
+        return f"nothing would be merged: {mapless}"
+    said = intention(_named(there), "would be merged: {} into {}")
+    return f"{said}; {mapless}" if mapless else said
+
+
+def _named(robots: Sequence[tuple[str, str]]) -> list[str]:
+    return [f"{robot} ({topic})" for robot, topic in robots]
 
 
 def _row(topic: TopicSummary) -> tuple[str, ...]:

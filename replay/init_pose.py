@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from mapmerge.prior import Prior
 from mapmerge.sim2 import Sim2
 from replay.errors import UsageError
+from replay.pose3 import MAX_PLACE_M
 
 FORM = "R=X,Y,YAW[±SX,±SY,±SYAW]"
 DEFAULT_SIGMA_M = 1.0
@@ -40,7 +41,8 @@ class InitPose:
     Raises
     ------
     UsageError
-        If a number is not finite, a deviation not positive, or the turn more than a full one.
+        If a number is not finite, the place farther away than anything is, a deviation not positive, or the turn more
+        than a full one.
     """
 
     robot: str
@@ -55,6 +57,10 @@ class InitPose:
         sigmas = (self.sigma_x_m, self.sigma_y_m, self.sigma_yaw_rad)
         if not all(map(math.isfinite, (self.x_m, self.y_m, self.yaw_rad, *sigmas))):
             raise UsageError(f"--init-pose {self}: expected finite numbers")
+        if max(abs(self.x_m), abs(self.y_m)) > MAX_PLACE_M:
+            raise UsageError(
+                f"--init-pose {self}: its shift is ({self.x_m}, {self.y_m}); at most {MAX_PLACE_M:g} m were expected"
+            )
         if min(sigmas) <= 0.0:
             raise UsageError(f"--init-pose {self}: expected standard deviations that are more than 0")
         if abs(self.yaw_rad) > math.tau:

@@ -20,11 +20,14 @@ class GridMessage:
         ``header.frame_id`` as recorded.
     grid
         The map; its cells are a read-only view of the message where possible.
+    odd_cells
+        How many of them were outside −1 to 100, and became unknown.
     """
 
     stamp_ns: int
     frame_id: str
     grid: Grid
+    odd_cells: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,6 +40,8 @@ class UpdateMessage:
         Cell of the full grid that the rectangle's cell (0, 0) replaces (``x`` and ``y`` of the message).
     cells
         Shape (rows, columns), int8, as in `Grid`.
+    odd_cells
+        As of a `GridMessage`.
     """
 
     stamp_ns: int
@@ -44,6 +49,7 @@ class UpdateMessage:
     col: int
     row: int
     cells: Cells
+    odd_cells: int = 0
 
 
 @dataclass(frozen=True, slots=True)

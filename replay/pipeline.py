@@ -20,6 +20,7 @@ from replay.errors import InputError
 from replay.events import Event, Finished, Merged, Noted, Skipped, Started, Timing
 from replay.footprint import enough_memory
 from replay.gallery import Gallery
+from replay.no_map import losses_of, none_used
 from replay.options import RunOptions
 from replay.plan import Plan, memory_limit, open_plan
 from replay.report import ReportBuilder
@@ -28,7 +29,13 @@ from replay.timeline import Transforms, ticks
 
 
 def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
-    """Replay what was planned and yield what happens."""
+    """Replay what was planned and yield what happens.
+
+    Raises
+    ------
+    InputError
+        If a recording cannot be read, no map could be used, or there is not enough memory.
+    """
     settings = options.settings()
     report = ReportBuilder(plan.robots, settings, __version__)
     beliefs = Beliefs(plan.map_frames, options.init_poses, plan.recordings_with_transforms())
@@ -74,7 +81,10 @@ def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
             done, stamp_ns = done + tick.messages, tick.stamp_ns
             yield Merged(stamp_ns, result, report.build(stamp_ns, result, inputs), pictures, timing, done, total)
     yield from _noted(report, beliefs.missed())
-    yield Finished(report.build(stamp_ns, merger.result, plan.describe_inputs(tallies)))
+    final = report.build(stamp_ns, merger.result, plan.describe_inputs(tallies))
+    if stamp_ns is None:
+        raise none_used([str(run.path) for run in options.runs], {item.topic for item in plan.robots}, losses_of(final))
+    yield Finished(final)
 
 
 def merge_config(options: RunOptions) -> MergeConfig:

@@ -14,6 +14,7 @@ from replay.errors import UsageError
 from replay.events import Clock, RobotInput
 from replay.footprint import MemoryLimit
 from replay.init_pose import refuse_unfit
+from replay.no_map import refuse_mapless
 from replay.options import NS_PER_S, RunOptions
 from replay.selection import Selected, select
 from replay.sources import open_sources
@@ -42,6 +43,8 @@ class Plan:
         Each robot's map frame as recorded, its leading slash stripped; None without a usable map.
     transform_feeds
         Which transforms are read; None if none are to be used.
+    mapped
+        The robots of which there is a map that can be used.
     """
 
     infos: tuple[SourceInfo, ...]
@@ -50,6 +53,7 @@ class Plan:
     window: Window
     map_frames: Mapping[str, str | None]
     transform_feeds: tuple[Feed, ...] | None
+    mapped: frozenset[str]
 
     def files(self) -> list[Path]:
         """Return the files that are read."""
@@ -139,6 +143,9 @@ def _plan(sources: list[Source], options: RunOptions) -> Plan:
     selected = select(options.runs, infos, robots=options.robots, topics=options.topics, losses=losses)
     refuse_unfit([item.robot for item in selected], options.init_poses)
     probes = agreed(_probes(sources, infos, selected, options))
+    mapped = _robots_with_maps(selected, probes)
+    if not mapped:
+        refuse_mapless(sources, {item.topic for item in selected})
     refuse_recorded_twice(probes, [run.path.name for run in options.runs], options.reorder_window_ns)
     offsets = offsets_ns(selected[0].robot, probes, align_starts=options.align_starts)
     start_ns, stop_ns = _span_ns(probes, offsets)
@@ -157,7 +164,14 @@ def _plan(sources: list[Source], options: RunOptions) -> Plan:
         window,
         {item.robot: _bare(frame_ids.get(item.robot)) for item in selected},
         transform_feeds(sources, probes, offsets, options.clock) if options.use_tf else None,
+        mapped,
     )
+
+
+def _robots_with_maps(selected: tuple[Selected, ...], probes: list[Probe]) -> frozenset[str]:
+    """Return the robots of which there is a map that can be used, and not only updates of parts."""
+    topics = {(item.robot, item.topic) for item in selected}
+    return frozenset(item.robot for item in probes if (item.robot, item.topic) in topics)
 
 
 def _refuse_empty(window: Window, start_ns: int, stop_ns: int) -> None:

@@ -7,7 +7,7 @@ What is absent is None. Nothing in a report depends on the machine or on the tim
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -16,7 +16,7 @@ from mapmerge.match import Match
 from mapmerge.merger import MergeResult
 from mapmerge.outcome import ChangeKind, Pair, RobotOutcome
 from mapmerge.prior import Prior
-from mapmerge.reasons import Reason
+from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2, wrap_angle
 from replay.events import Noted, Report, RobotInput, Skipped
 from replay.sources.losses import Listing
@@ -49,6 +49,8 @@ class ReportBuilder:
         self._skipped: Counter[str] = Counter()
         self._places: dict[tuple[str, str, str, str], Json] = {}
         self._listing = Listing()
+        self._refused: dict[str, Counter[str]] = {}
+        self._damaged: set[str] = set()
         self._first_merged_ns: dict[str, int] = {}
         self._history: list[Json] = []
         self._notes: list[Json] = []
@@ -58,6 +60,10 @@ class ReportBuilder:
     def skip(self, event: Skipped) -> None:
         """Count a message, or a part of a recording, that was not used."""
         self._skipped[event.cause] += _at_least(event)
+        if event.robot:
+            self._refused.setdefault(event.robot, Counter())[event.cause] += _at_least(event)
+        elif event.place and not event.topic and event.messages != 0:
+            self._damaged.add(event.input)
         topic, place = self._listing.at((event.cause, event.input), event.topic, event.place)
         key = str(event.cause), event.input, topic, place
         there = self._places.setdefault(
@@ -101,12 +107,16 @@ class ReportBuilder:
 
     def build(self, stamp_ns: int | None, result: MergeResult, inputs: Sequence[Mapping[str, Any]]) -> Report:
         """Return the report as of now."""
+        names = [str(item["name"]) for item in inputs]
         return {
             "schema": SCHEMA,
             "version": self._version,
             "stamp_ns": stamp_ns,
             "reference": self._robots[0].robot,
-            "robots": {item.robot: self._robot(item, result.robots[item.robot]) for item in self._robots},
+            "robots": {
+                item.robot: self._robot(item, result.robots[item.robot], [names[index] for index in item.inputs])
+                for item in self._robots
+            },
             "pairs": [
                 {**_pair(pair, match, result.priors.get(pair)), "searched": self._searched.get(pair)}
                 for pair, match in result.pairs.items()
@@ -120,11 +130,22 @@ class ReportBuilder:
             "settings": dict(self._settings),
         }
 
-    def _robot(self, item: RobotInput, outcome: RobotOutcome) -> Json:
+    def _why(self, robot: str, reason: Reason, recordings: Collection[str]) -> Reason:
+        """Return the reason; of a robot without a map, with what became of its messages, which no merger knows."""
+        if reason.code is not ReasonCode.NO_MAP:
+            return reason
+        if robot in self._refused:
+            causes = ", ".join(f"{count} {cause}" for cause, count in sorted(self._refused[robot].items()))
+            return Reason(reason.code, f"no map that can be used yet, and messages are skipped: {causes}")
+        if self._damaged & set(recordings):
+            return Reason(reason.code, "no map that can be used yet, and parts of the recording are lost")
+        return reason
+
+    def _robot(self, item: RobotInput, outcome: RobotOutcome, recordings: Collection[str]) -> Json:
         placement = outcome.placement
         return {
             "status": str(outcome.status),
-            "reason": _reason(outcome.reason),
+            "reason": _reason(self._why(item.robot, outcome.reason, recordings)),
             "merged_from_map": _pose(outcome.merged_from_map),
             **_agreement(outcome.agreement),
             "confidence": _share(outcome.confidence),

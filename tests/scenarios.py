@@ -18,7 +18,6 @@ from replay.pipeline import merge
 from replay.runs import RunPath
 from tests.bags import Recorded, write_mcap
 from tests.runs import (
-    bad_messages,
     bare_room,
     begun_anew,
     growing,
@@ -83,8 +82,8 @@ SCENARIOS: dict[str, Scenario] = {
         images="all",
     ),
     "no_map_at_all": Scenario(
-        lambda: in_log_order(*(list(bad_messages(robot, 0.0).values()) for robot in ("r1", "r2"))),
-        lambda last: last is None,
+        lambda: [seen("r1", 0.0, _nothing()), seen("r2", 1.0, _nothing())],
+        lambda last: _statuses(last) == ["no_map", "no_map"],
     ),
     "believed": Scenario(
         lambda: in_log_order([linked(0.0, link("", "r3/map"))], two_robots(), growing("r3", 1.0)),

@@ -64,7 +64,7 @@ def decode(raw: RawMessage) -> GridMessage | UpdateMessage:
 
 def _grid(message: OccupancyGrid) -> GridMessage:
     info = message.info
-    cells = _cells(message.data, info.width, info.height)
+    cells, odd_cells = _cells(message.data, info.width, info.height)
     resolution_m = _shortest(info.resolution)
     if not MIN_RESOLUTION_M <= resolution_m <= MAX_RESOLUTION_M:
         raise BadMessage(
@@ -73,7 +73,7 @@ def _grid(message: OccupancyGrid) -> GridMessage:
             f"{MAX_RESOLUTION_M:g}",
         )
     grid = Grid(cells, resolution_m, _flat_pose(info.origin))
-    return GridMessage(header_stamp_ns(message.header), message.header.frame_id, grid)
+    return GridMessage(header_stamp_ns(message.header), message.header.frame_id, grid, odd_cells)
 
 
 def _shortest(single: float) -> float:
@@ -82,12 +82,14 @@ def _shortest(single: float) -> float:
 
 
 def _update(message: _OccupancyGridUpdate) -> UpdateMessage:
-    cells = _cells(message.data, message.width, message.height)
-    return UpdateMessage(header_stamp_ns(message.header), message.header.frame_id, message.x, message.y, cells)
+    cells, odd_cells = _cells(message.data, message.width, message.height)
+    header = message.header
+    return UpdateMessage(header_stamp_ns(header), header.frame_id, message.x, message.y, cells, odd_cells)
 
 
-def _cells(data: Cells, width: int, height: int) -> Cells:
-    """Return the cells as rows and columns, read-only."""
+def _cells(data: Cells, width: int, height: int) -> tuple[Cells, int]:
+    """Return the cells as rows and columns, read-only, and how many of them had no meaning."""
+    odd_cells = 0
     if data.size != width * height:
         raise BadMessage(
             "size_mismatch", f"there are {data.size} cells; {width} × {height} = {width * height} were expected"
@@ -97,10 +99,12 @@ def _cells(data: Cells, width: int, height: int) -> Cells:
     if max(width, height) > MAX_SIDE_CELLS:
         raise BadMessage("too_large", f"the map has {width} × {height} cells; at most {MAX_SIDE_CELLS} a side are read")
     if data.min() < UNKNOWN or data.max() > 100:
-        data = np.where((data >= UNKNOWN) & (data <= 100), data, np.int8(UNKNOWN))
+        has_meaning = (data >= UNKNOWN) & (data <= 100)
+        odd_cells = data.size - int(np.count_nonzero(has_meaning))
+        data = np.where(has_meaning, data, np.int8(UNKNOWN))
     cells = data.reshape(height, width)
     cells.flags.writeable = False
-    return cells
+    return cells, odd_cells
 
 
 def _flat_pose(pose: Pose) -> Sim2:

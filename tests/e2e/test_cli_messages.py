@@ -11,11 +11,12 @@ import pytest
 from mapmerge.grid import Grid
 from mapmerge.sim2 import Sim2
 from replay.skip_cause import SkipCause
-from tests.bags import chunks, damage, write_mcap, write_rosbag1, write_rosbag2
+from tests.bags import Recorded, chunks, damage, write_mcap, write_rosbag1, write_rosbag2
 from tests.outputs import maps, raw, reports, same_map, transforms
 from tests.program import Program
 from tests.runs import (
     FLOOR_FROM_MAP,
+    at,
     bad_messages,
     bare_room,
     begun_anew,
@@ -59,6 +60,92 @@ def test_where_damage_left_no_map_the_error_says_so(replay: Program, tmp_path: P
     assert ran.status == 2
     assert re.search(rf"; lost are .*\d+ messages? \(\w+\), .*first {name}, the chunk at byte \d+: ", ran.error)
     assert "; lost are " in replay("info", run).out
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("run.bag", lambda path: write_rosbag1(path, two_robots(), "bz2")),
+        ("run.mcap", lambda path: write_mcap(path, two_robots())),
+    ],
+)
+def test_where_all_maps_are_lost_though_an_index_has_them(replay: Program, tmp_path: Path, name: str, write) -> None:
+    run = write(tmp_path / name)
+    for chunk in chunks(run):
+        damage(run, chunk)
+    check_none(replay, run, f"first {name}, the chunk at byte ")
+
+
+def check_none(replay: Program, run: Path, words: str) -> None:
+    """Check that of a recording of r1 and r2 no map can be used, and that all say so."""
+    ran = replay.merge(run)
+    assert ran.status == 2
+    assert ran.error.startswith(f"{run}: no map of /r1/map, /r2/map can be used; lost are ")
+    assert words in ran.error
+    assert not list(run.parent.glob("out*"))
+    assert f"nothing would be merged: {ran.error}" in replay("info", run).out.splitlines()
+
+
+def test_only_updates_are_no_map(replay: Program, tmp_path: Path) -> None:
+    parts = [updated("r1", seconds, 0, 0, TestUpdates.PART) for seconds in (1.0, 2.0)]
+    run = write_mcap(tmp_path / "run.mcap", [seen("r1", 0.0, resolution=0.0), *parts])
+    ran = replay.merge(run)
+    assert (ran.status, "lost are 1 message (bad_resolution)" in ran.error) == (2, True)
+
+
+def test_no_map_that_fits_into_memory(replay: Program, tmp_path: Path) -> None:
+    grown = Grid(np.zeros((1200, 1200), np.int8), 0.1)
+    run = write_mcap(tmp_path / "run.mcap", [seen(robot, 0.0, grown) for robot in ("r1", "r2")])
+    ran = replay.merge(run, "--max-memory", "2MB")
+    assert ran.status == 2
+    last = ran.err.splitlines()[-1]
+    assert last.startswith(f"replay: error: {run}: no map of /r1/map, /r2/map can be used; lost are ")
+    assert "(over_memory)" in last
+    assert not list(tmp_path.glob("out*"))
+
+
+@pytest.mark.parametrize(
+    ("lost", "words"),
+    [
+        ("r1", "nothing would be merged: no map of r1 (/r1/map) can be used"),
+        ("r2", "would be merged: r3 (/r3/map) into r1 (/r1/map), the reference; no map of r2 (/r2/map) can be used"),
+    ],
+)
+def test_info_names_a_robot_of_which_no_map_can_be_used(replay: Program, tmp_path: Path, lost: str, words: str) -> None:
+    robots = ("r1", "r2", "r3")
+    messages = [seen(robot, 0.0, **({"resolution": 0.0} if robot == lost else {})) for robot in robots]
+    assert replay("info", write_mcap(tmp_path / "run.mcap", messages)).out.splitlines()[-1] == words
+
+
+def test_a_robot_whose_maps_are_lost_with_a_part_says_so(replay: Program, tmp_path: Path) -> None:
+    talk = Recorded("/chatter", "std_msgs/msg/String", growing("r2")[-1].log_time_ns, {"data": "x" * 9000})
+    run = write_mcap(tmp_path / "run.mcap", [*growing("r2"), talk, *growing("r1", 50.0)], chunk_bytes=40_000)
+    first, *_ = chunks(run)
+    assert first.topics == {"/r2/map", "/chatter"}
+    damage(run, first)
+    found = replay.merge(run).robots["r2"]["reason"]
+    assert found == {"code": "no_map", "message": "no map that can be used yet, and parts of the recording are lost"}
+
+
+def test_cells_that_mean_nothing_are_named_once_a_topic(replay: Program, tmp_path: Path) -> None:
+    cells = flat_map("r2").cells.reshape(-1).copy()
+    cells[:3000] = [101, 127, -128] * 1000  # of 12 000
+    few = flat_map("r1").cells.reshape(-1).copy()
+    few[:20] = 111
+    part = updated("r1", 5.0, 0, 0, np.full((2, 2), -5, np.int8))
+    messages = [seen("r1", 0.0), *(seen("r2", float(second), data=cells) for second in (1, 2, 3)), part]
+    run = write_mcap(tmp_path / "run.mcap", [*messages, seen("r1", 6.0, data=few)])
+    ran = replay.merge(run, "--strict")
+    expected = {
+        ("r2", f"run.mcap: /r2/map at {at(1.0)} ns: 25 %"),
+        ("r1", f"run.mcap: /r1/map_updates at {at(5.0)} ns: 100 %"),
+        ("r1", f"run.mcap: /r1/map at {at(6.0)} ns: less than 1 %"),
+    }
+    words = " of the cells are outside −1 to 100: such cells are taken as unknown"
+    assert len(ran.report["notes"]) == len(expected)
+    assert {(each["robot"], each["message"].removesuffix(words)) for each in ran.report["notes"]} == expected
+    assert ran.err.count(words) == len(expected)
+    assert ran.report["skipped"] == {}
 
 
 def test_metadata_that_cannot_be_read_is_named(replay: Program, tmp_path: Path) -> None:
@@ -175,15 +262,13 @@ class TestBadMessages:
         found = ran.robots["r2"]
         assert (found["status"], found["reason"]["code"], found["updates"]) == ("no_map", "no_map", 0)
         assert (found["map_topic"], found["map_frame"]) == ("/r2/map", "r2/map")
+        assert ran.report["inputs"][0]["late"] == 0
+        assert "messages are skipped: 1 bad_origin, 1 bad_resolution, 1 empty" in found["reason"]["message"]
         assert [ran.robots["r1"]["updates"], len(maps(ran.mcap))] == [3, 3]
 
     def test_no_robot_with_anything_else(self, replay: Program, tmp_path: Path) -> None:
         messages = in_log_order(*(list(bad_messages(robot, 0.0).values()) for robot in ("r1", "r2")))
-        ran = replay.merge(write_mcap(tmp_path / "run.mcap", messages))
-        assert ran.statuses == {"r1": "no_map", "r2": "no_map"}
-        assert ran.report["stamp_ns"] is None
-        ((time_ns, report),) = reports(ran.mcap)
-        assert (time_ns, report["robots"]["r1"]["status"]) == (0, "no_map")
+        check_none(replay, write_mcap(tmp_path / "run.mcap", messages), "2 messages (size_mismatch), 2 messages (")
 
     def test_a_topic_without_any_message(self, replay: Program, tmp_path: Path) -> None:
         """As in a recording of a robot whose SLAM never came up."""

@@ -78,6 +78,11 @@ def near(prior: Prior | None, pose: Sim2) -> bool:
 
 
 class TestInitPose:
+    def test_as_far_away_as_a_place_may_be(self, replay: Program, two: Path) -> None:
+        ran = replay.merge(two, "--init-pose", "r2=1e8,-1e8,0", images="all")
+        assert ran.statuses == {"r1": "reference", "r2": "unmerged"}
+        assert ran.robots["r2"]["reason"]["code"] == "prior_contradicted"
+
     def test_is_given_to_the_matcher_and_reported(
         self, merged: Callable[..., Any], matcher: RecordingMatcher, two: Path
     ) -> None:
@@ -114,6 +119,11 @@ class TestInitPose:
         [
             (["r2=1,2"], "--init-pose r2=1,2: expected R=X,Y,YAW[±SX,±SY,±SYAW]"),
             (["r2=1,2,90"], "if it is in degrees, give 90.0deg"),
+            (
+                ["r2=1e300,0,0"],
+                "--init-pose r2=1e+300,0.0,0.0: its shift is (1e+300, 0.0); at most 1e+08 m",
+            ),
+            (["r2=0,-1.1e8,0"], "its shift is (0.0, -110000000.0); at most 1e+08 m were expected"),
             (["r9=1,2,0"], "--init-pose r9: no such robot is merged; there are: r2"),
             (["r1=1,2,0"], "--init-pose r1: r1 is the reference"),
             (["r2=1,2,0", "r2=1,2,0"], "--init-pose r2: given twice"),

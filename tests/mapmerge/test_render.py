@@ -49,6 +49,7 @@ CASES = {
     "five curves": curves(*[RAMP] * 5),
     "one value": curves(np.ones(1)),
     "a surface": surface(RNG.normal(size=(120, 200)), ((3, 4), (119, 199)), (60, 100)),
+    "marks far away": surface(np.zeros((30, 30)), ((-(10**12), 5), (5, 10**300)), (2 * 10**9, 2 * 10**9)),
     "a flat surface": surface(np.zeros((30, 30))),
     "a large surface": surface(RNG.normal(size=(3000, 50)), ((0, 0),), (2999, 49)),
     "one row": surface(RNG.normal(size=(1, 400)), ((0, 3),), (0, 399)),

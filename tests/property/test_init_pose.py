@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from mapmerge.sim2 import Sim2
 from replay.errors import UsageError
 from replay.init_pose import DEFAULT_SIGMA_M, DEFAULT_SIGMA_YAW_RAD, InitPose
+from replay.pose3 import MAX_PLACE_M
 
-numbers = st.floats(allow_nan=False, allow_infinity=False)
+numbers = st.floats(-MAX_PLACE_M, MAX_PLACE_M)
 sigmas = st.floats(0.0, exclude_min=True, allow_nan=False, allow_infinity=False)
 names = st.from_regex(r"[A-Za-z0-9_/][A-Za-z0-9_.\-/]*", fullmatch=True)
 turns = st.floats(-math.tau, math.tau)

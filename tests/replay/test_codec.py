@@ -54,6 +54,8 @@ class TestDecode:
         cells = np.array([-128, -2, -1, 0, 100, 101, 127, 50], np.int8)
         message = _decoded(encoding, width=4, height=2, data=cells)
         assert message.grid.cells.tolist() == [[-1, -1, -1, 0], [100, -1, -1, 50]]
+        assert message.odd_cells == 4
+        assert _decoded(encoding).odd_cells == 0
         assert not message.grid.cells.flags.writeable
 
     def test_update(self, encoding: Encoding) -> None:
@@ -63,6 +65,7 @@ class TestDecode:
         assert isinstance(message, UpdateMessage)
         assert (message.stamp_ns, message.frame_id, message.col, message.row) == (5, "f", -2, 7)
         assert message.cells.tolist() == [[0, 100, -1], [-1, 5, 6]]
+        assert message.odd_cells == 1
         assert not message.cells.flags.writeable
 
     @pytest.mark.parametrize("yaw_rad", [0.0, 0.5, -3.0, math.pi, 1e-9])

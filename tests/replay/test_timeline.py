@@ -103,6 +103,16 @@ class TestOrder:
         assert told(found) == [(0.0, {"r1": 3}), (20.0, {"r1": 2})]
         assert tally.late == 1
 
+    @pytest.mark.parametrize("log_s", [0.0, 11.0])
+    def test_what_is_refused_is_never_late(self, log_s: float) -> None:
+        """Neither where nothing tells its time, nor where it comes too late for its place."""
+        bad = bad_messages("r2", log_s)["bad_resolution"]
+        ahead = [mapped("r1", 1.0, 1, stamp_s=101.0), mapped("r1", 10.0, 2, stamp_s=110.0)]
+        known = [] if log_s == 0.0 else [mapped("r2", 0.0, 3)]
+        found, (tally,) = run(feed(*sorted([bad, *ahead, *known], key=lambda each: each.log_time_ns)))
+        assert "bad_resolution" in told(found)
+        assert (tally.late, tally.messages) == (0, 3 + len(known))
+
     def test_exactly_the_window(self) -> None:
         messages = [mapped("r1", 0.0, 1), mapped("r1", 5.0, 2), mapped("r1", 5.5, 3, stamp_s=0.0)]
         assert run(feed(*messages))[1][0].late == 0
