@@ -20,6 +20,7 @@ from replay.events import Clock, Noted, Skipped
 from replay.footprint import MemoryLimit
 from replay.messages import GridMessage, TransformMessage, UpdateMessage
 from replay.odd_cells import OddCells
+from replay.options import NS_PER_S
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, RawMessage, Source
 from replay.stamps import LAST_NS, Stamp, StampCheck
@@ -238,6 +239,8 @@ class _Times:
         if clock == "header" and not self._believes(raw, content.stamp_ns):
             return self._guessed(raw)
         own_ns = stamp_ns(clock, raw, content)
+        if clock == "header":
+            own_ns += self._checks[raw.topic].put_back_ns
         if own_ns > LAST_NS:
             return None
         time_ns = self._shifted(raw, own_ns)
@@ -259,7 +262,12 @@ class _Times:
         if own_ns <= 0:
             return False
         stamp = Stamp(own_ns, raw.log_time_ns)
-        if own_ns <= LAST_NS and self._checks[raw.topic].believes(stamp):
+        check = self._checks[raw.topic]
+        before_ns = check.put_back_ns
+        if own_ns <= LAST_NS and check.believes(stamp):
+            if check.put_back_ns > before_ns:
+                back_s = (check.put_back_ns - before_ns) / NS_PER_S
+                self._note(raw, f"the clock of its headers was put back by {back_s:.0f} s: it is taken to have gone on")
             return True
         if raw.log_time_ns <= LAST_NS:
             self._doubt(raw, stamp)
@@ -269,12 +277,12 @@ class _Times:
         self._tally.bad_stamps += 1
         if raw.topic not in self._doubted:
             self._doubted.add(raw.topic)
-            where = f"{self._feed.source.path.name}: {raw.topic} at {raw.log_time_ns} ns"
-            message = (
-                f"{where}: the header says {moment(stamp.own_ns)}, far from those around it: "
-                "such a message is taken at the time at which it was recorded"
-            )
-            self._notes.append(Noted(self._feed.robot_of.get(raw.topic, ""), message))
+            said = f"the header says {moment(stamp.own_ns)}, far from those around it"
+            self._note(raw, f"{said}: such a message is taken at the time at which it was recorded")
+
+    def _note(self, raw: RawMessage, said: str) -> None:
+        where = f"{self._feed.source.path.name}: {raw.topic} at {raw.log_time_ns} ns"
+        self._notes.append(Noted(self._feed.robot_of.get(raw.topic, ""), f"{where}: {said}"))
 
     def _guessed(self, raw: RawMessage) -> int | None:
         if raw.log_time_ns > LAST_NS:

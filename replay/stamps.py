@@ -52,13 +52,21 @@ class StampCheck:
     A stamp that cannot follow the last one that was believed is not believed, until `_FOLLOWED` in a row follow each
     other: then the clock jumped. Nothing is read ahead.
 
+    A clock that was put back is taken to have gone on: what was recorded last is newest, whatever it says.
+
     Parameters
     ----------
     lead_ns
         How far the topic's stamps are ahead of the recorder's clock when it begins; None if the first is believed.
+
+    Attributes
+    ----------
+    put_back_ns
+        How far the clock was put back so far: what is to be added to stamps that are believed.
     """
 
     def __init__(self, lead_ns: int | None = None) -> None:
+        self.put_back_ns = 0
         self._first_lead_ns = lead_ns
         self._believed: Stamp | None = None
         self._doubted: Stamp | None = None
@@ -74,6 +82,8 @@ class StampCheck:
             self._doubted, self._in_a_row = stamp, self._in_a_row + 1 if follows else 1
             if self._in_a_row < _FOLLOWED:
                 return False
+            gone_on_ns = before.own_ns + max(0, stamp.log_ns - before.log_ns)
+            self.put_back_ns += gone_on_ns - stamp.own_ns if stamp.own_ns < before.own_ns else 0
         self._believed = stamp
         return True
 

@@ -195,6 +195,19 @@ class TestStamps:
         ]
         assert tally.bad_stamps == 2
 
+    @pytest.mark.parametrize("back_s", [100.0, 500.0, 1e6])
+    def test_a_clock_that_is_put_back_is_taken_to_have_gone_on(self, back_s: float) -> None:
+        """What was recorded last is newest, also once the clock says again what it said before."""
+        stamps = [2e6 + 10.0 * index - (back_s if index >= 4 else 0.0) for index in range(70)]
+        found, (tally,) = run(feed(*(mapped("r1", 10.0 * index, index, stamp) for index, stamp in enumerate(stamps))))
+        ticks_of = [item for item in told(found) if item != "noted"]
+        assert [grids["r1"] for _, grids in ticks_of] == list(range(70))
+        assert [time_s for time_s, _ in ticks_of] == [2e6 + 10.0 * index for index in range(70)]
+        assert (tally.bad_stamps, tally.late) == (2, 0)
+        said = [item.message for item in found if isinstance(item, Noted)]
+        assert len(said) == 2
+        assert f"was put back by {back_s:.0f} s" in said[1]
+
     def test_the_first_of_each_topic_is_named_and_all_are_counted(self) -> None:
         wild = [
             mapped(robot, 10.0 * n, n, 10.0 * n + (1e6 if n % 2 else 0)) for n in range(8) for robot in ("r1", "r2")
