@@ -14,6 +14,7 @@ from pathlib import Path
 
 from replay.errors import InputError
 from replay.skip_cause import SkipCause
+from replay.sources.boundary import COPY_AGAIN
 from replay.sources.losses import Loss, Losses
 from replay.sources.sqlite3_salvage import read_header
 from replay.sources.temporary import temporary_folder
@@ -106,7 +107,8 @@ def check_wal(path: Path, wal_path: Path, shown: Path, losses: Losses) -> Wal | 
         losses.add(Loss(SkipCause.DAMAGED, name, "it does not begin like a write-ahead log of SQLite"))
         return None
     if wal.is_cut:
-        losses.add(Loss(SkipCause.ENDS_EARLY, name, f"the file ends early at byte {wal_path.stat().st_size}"))
+        detail = f"the file ends early at byte {wal_path.stat().st_size}; {COPY_AGAIN}"
+        losses.add(Loss(SkipCause.ENDS_EARLY, name, detail))
     with path.open("rb") as file:
         header = read_header(file)
     there = path.stat().st_size // header.page_bytes if header else 0

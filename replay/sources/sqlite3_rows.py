@@ -10,6 +10,7 @@ from typing import BinaryIO, NamedTuple, Protocol
 
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
+from replay.sources.boundary import COPY_AGAIN
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import TooLargeError
 from replay.sources.sqlite3_salvage import (
@@ -301,7 +302,7 @@ class SalvagedTables:
     def _name_losses(self, cut: str, missing: str) -> None:
         gaps, count = self._leaves.gaps, self._found.counts.total()
         if cut:
-            detail = f"the file ends early: {missing}; {counted(count, 'message')} could be read"
+            detail = f"the file ends early: {missing}; {counted(count, 'message')} could be read; {COPY_AGAIN}"
             self._losses.add(Loss(SkipCause.ENDS_EARLY, cut, detail, _lost(self._leaves, count)))
             return
         for gap in gaps:
