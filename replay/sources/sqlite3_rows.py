@@ -10,6 +10,7 @@ from typing import BinaryIO, NamedTuple, Protocol
 
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
+from replay.sources.boundary import COPY_AGAIN
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import TooLargeError
 from replay.sources.sqlite3_places import Places, own_places, told_places
@@ -278,7 +279,7 @@ class SalvagedTables:
             losses.add(loss)
         count = self._found.counts.total()
         if whole is not None:
-            detail = f"{whole.detail}; {counted(count, 'message')} could be read"
+            detail = f"{whole.detail}; {counted(count, 'message')} could be read; {COPY_AGAIN}"
             losses.add(replace(whole, detail=detail, messages=_lost(self._leaves, count)))
             return
         for gap in self._leaves.gaps:

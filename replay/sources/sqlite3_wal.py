@@ -11,6 +11,7 @@ from typing import BinaryIO
 import numpy as np
 
 from replay.skip_cause import SkipCause
+from replay.sources.boundary import COPY_AGAIN
 from replay.sources.losses import Loss, Losses
 from replay.sources.sqlite3_log import PageLog, is_page_length
 
@@ -84,7 +85,7 @@ def _read(file: BinaryIO, size: int, head: bytes, order: str, name: str, losses:
         start += frame_bytes
     is_cut = start < size < start + frame_bytes
     if is_cut:
-        losses.add(Loss(SkipCause.ENDS_EARLY, name, f"the file ends early at byte {size}"))
+        losses.add(Loss(SkipCause.ENDS_EARLY, name, f"the file ends early at byte {size}; {COPY_AGAIN}"))
     if used < written:
         detail = f"the checksum of its page {used + 1} is wrong: that one and the {written - used - 1} after it"
         losses.add(Loss(SkipCause.WRONG_CHECKSUM, name, f"{detail} are not used"))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from replay.sources.zstd import zstd
 from tests import bags
 from tests.program import Program
 from tests.runs import seen, two_robots
@@ -43,12 +44,27 @@ def test_what_a_run_left_is_to_be_finished(replay: Program, two: Path, tmp_path:
         assert "copy it again" not in line
 
 
-def test_a_bag_that_was_cut_off_is_to_be_copied_again(replay: Program, tmp_path: Path) -> None:
-    run = bags.write_rosbag1(tmp_path / "run.bag", two_robots())
-    os.truncate(run, run.stat().st_size * 2 // 3)
-    (line,) = (each for each in replay.merge(run).err.splitlines() if ": ends_early: " in each)
-    assert "its index should begin at byte" in line
-    assert line.endswith("copy it again if there is a whole one")
+@pytest.mark.parametrize("write", [bags.write_mcap, bags.write_rosbag1, bags.write_bare_db3])
+@pytest.mark.parametrize("is_compressed", [False, True])
+def test_what_was_cut_off_is_to_be_copied_again(replay: Program, tmp_path: Path, write, is_compressed: bool) -> None:
+    run = write(tmp_path / "run", [*two_robots(), *(each for each in bags.SAMPLE if each.topic == "/chatter")])
+    data = run.read_bytes()
+    if is_compressed:
+        data = b"".join(zstd.compress(data[at : at + 500]) for at in range(0, len(data), 500))
+    run.write_bytes(data[: len(data) // 2])
+    lines = [each for each in replay("info", run).out.splitlines() if ": ends_early: " in each]
+    assert lines
+    assert all(each.endswith("copy it again if there is a whole one") for each in lines)
+
+
+def test_a_bag_that_was_never_whole_is_not(replay: Program, tmp_path: Path) -> None:
+    run = bags.write_rosbag1(tmp_path / "run.bag.active", two_robots())
+    data = bytearray(run.read_bytes())
+    at = data.index(b"index_pos=") + len(b"index_pos=")
+    data[at : at + 8] = bytes(8)
+    run.write_bytes(data)
+    (line,) = (each for each in replay("info", run).out.splitlines() if ": ends_early: " in each)
+    assert line.endswith("its recording was not ended properly")
 
 
 def test_how_many_losses_are_not_listed(replay: Program, tmp_path: Path) -> None:
