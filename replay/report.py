@@ -49,21 +49,18 @@ class ReportBuilder:
         self._skipped: Counter[str] = Counter()
         self._places: dict[tuple[str, str, str, str], Json] = {}
         self._places_of: dict[tuple[str, str, str], set[str]] = {}
-        self._refused: dict[str, Counter[str]] = {}
-        self._damaged: set[str] = set()
         self._first_merged_ns: dict[str, int] = {}
         self._history: list[Json] = []
         self._notes: list[Json] = []
         self._priors: Mapping[str, Prior] = {}
         self._searched: dict[Pair, Json] = {}
+        self._refused: dict[str, Counter[str]] = {}
+        self._damaged: set[str] = set()
 
     def skip(self, event: Skipped) -> None:
         """Count a message, or a part of a recording, that was not used."""
+        self._blame(event)
         self._skipped[event.cause] += _at_least(event)
-        if event.robot:
-            self._refused.setdefault(event.robot, Counter())[event.cause] += _at_least(event)
-        elif event.place and not event.topic and event.messages != 0:
-            self._damaged.add(event.input)
         key = str(event.cause), event.input, event.topic, self._listed_place(event)
         there = self._places.setdefault(
             key,
@@ -87,6 +84,15 @@ class ReportBuilder:
             return OTHER_PLACES
         known.add(event.place)
         return event.place
+
+    def _blame(self, event: Skipped) -> None:
+        """Keep what may be why a robot has no map."""
+        if event.messages == 0:
+            return
+        if event.robot:
+            self._refused.setdefault(event.robot, Counter())[event.cause] += _at_least(event)
+        elif event.place and not event.topic:
+            self._damaged.add(event.input)
 
     def note(self, event: Noted) -> None:
         """Keep what a reader should know."""
