@@ -85,15 +85,6 @@ class ReportBuilder:
         known.add(event.place)
         return event.place
 
-    def _blame(self, event: Skipped) -> None:
-        """Keep what may be why a robot has no map."""
-        if event.messages == 0:
-            return
-        if event.robot:
-            self._refused.setdefault(event.robot, Counter())[event.cause] += _at_least(event)
-        elif event.place and not event.topic:
-            self._damaged.add(event.input)
-
     def note(self, event: Noted) -> None:
         """Keep what a reader should know."""
         self._notes.append({"robot": event.robot, "message": event.message})
@@ -142,6 +133,15 @@ class ReportBuilder:
             "inputs": [dict(item) for item in inputs],
             "settings": dict(self._settings),
         }
+
+    def _blame(self, event: Skipped) -> None:
+        """Keep what may be why a robot has no map."""
+        if event.messages == 0:
+            return
+        if event.robot:
+            self._refused.setdefault(event.robot, Counter())[event.cause] += _at_least(event)
+        elif event.place and not event.topic:
+            self._damaged.add(event.input)
 
     def _why(self, robot: str, reason: Reason, recordings: Collection[str]) -> Reason:
         """Return the reason; of a robot without a map, with what became of its messages, which no merger knows."""
