@@ -6,14 +6,17 @@ import argparse
 import math
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from replay import __version__
 from replay.errors import InputError, UsageError
 
 if TYPE_CHECKING:
     from replay.options import OutputOptions, RunOptions
+
+_Value = TypeVar("_Value")
 
 _EXAMPLES = """\
 examples:
@@ -96,6 +99,11 @@ def parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     _input_arguments(info)
+    info.add_argument(
+        "--max-memory",
+        metavar="SIZE",
+        help="leave out what of a recording is larger to read at once, such as 500MB (default: 1 GiB)",
+    )
     _recover_command(commands)
     return program
 
@@ -253,6 +261,7 @@ def _output_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run_options(options: argparse.Namespace) -> RunOptions:
     """Return what is to be read and how it is to be merged."""
+    from replay.footprint import size_to_bytes
     from replay.options import RunOptions, TimeBound, seconds_to_ns
     from replay.runs import RunPath, TopicChoice
 
@@ -262,14 +271,25 @@ def run_options(options: argparse.Namespace) -> RunOptions:
         robots=_robots(options.robots),
         topics=tuple(TopicChoice.parse(text) for text in options.topic),
         clock=options.clock,
-        start=TimeBound.parse(options.start) if options.start is not None else None,
-        stop=TimeBound.parse(options.stop) if options.stop is not None else None,
-        reorder_window_ns=seconds_to_ns(options.reorder_window),
+        start=_read("--start", options.start, TimeBound.parse) if options.start is not None else None,
+        stop=_read("--stop", options.stop, TimeBound.parse) if options.stop is not None else None,
+        reorder_window_ns=_read("--reorder-window", options.reorder_window, seconds_to_ns),
         align_starts=options.align_starts,
         strict=getattr(options, "strict", False),
         images=getattr(options, "images", "none"),
+        max_memory_bytes=(
+            _read("--max-memory", options.max_memory, size_to_bytes) if options.max_memory is not None else None
+        ),
         **placing,
     )
+
+
+def _read(flag: str, text: str, parse: Callable[[str], _Value]) -> _Value:
+    """Return what a flag says; of what it cannot say, tell which flag it was."""
+    try:
+        return parse(text)
+    except UsageError as error:
+        raise UsageError(f"{flag}: {error}") from error
 
 
 def _placing_options(options: argparse.Namespace) -> dict[str, Any]:
@@ -277,7 +297,6 @@ def _placing_options(options: argparse.Namespace) -> dict[str, Any]:
     from mapmerge.config import MergeConfig, VerifyConfig
     from mapmerge.errors import ConfigError
     from mapmerge.match import MATCHERS
-    from replay.footprint import size_to_bytes
     from replay.init_pose import InitPose
 
     if options.method not in MATCHERS:
@@ -292,7 +311,6 @@ def _placing_options(options: argparse.Namespace) -> dict[str, Any]:
         "use_tf": options.use_tf,
         "merge": merge,
         "jobs": _jobs(options.jobs),
-        "max_memory_bytes": size_to_bytes(options.max_memory) if options.max_memory is not None else None,
     }
 
 
@@ -349,7 +367,7 @@ def output_options(options: argparse.Namespace, run: RunOptions) -> OutputOption
     return OutputOptions(
         mcap=_mcap(options.output or Path(f"{stem}.merged.mcap")),
         rrd=not options.no_rrd,
-        every_ns=seconds_to_ns(options.every),
+        every_ns=_read("--every", options.every, seconds_to_ns),
         copy_maps=options.copy_maps,
         force=options.force,
     )

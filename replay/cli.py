@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         say(
             "replay: error: there is not enough memory; close other programs, or leave out what needs too much with "
-            "--max-memory SIZE (of merge)"
+            "--max-memory SIZE (of merge and info)"
         )
         return EXIT_BAD_INPUT
     except SystemExit:

@@ -15,13 +15,14 @@ from replay.skip_cause import SkipCause
 
 _UNITS = {"": 1, "B": 1, **{f"{k}B": 1000**n for n, k in enumerate("kMGT", 1)}}
 _UNITS |= {f"{k}iB": 1024**n for n, k in enumerate("KMGT", 1)}
-_BY_NAME = {name.lower(): factor for name, factor in _UNITS.items()}
+# as people type them: 200M
+_BY_NAME = {name.lower(): factor for name, factor in _UNITS.items()} | {k: 1000**n for n, k in enumerate("kmgt", 1)}
 _SIZE = re.compile(r"(\d+(?:\.\d*)?) ?([A-Za-z]*)", re.ASCII)
 _LEAST_BYTES = 1 << 20
 
 
 def size_to_bytes(text: str) -> int:
-    """Read a size such as 2GiB, 500MB or a plain number of bytes.
+    """Read a size such as 2GiB, 500MB, 500M (the same) or a plain number of bytes.
 
     Raises
     ------

@@ -39,9 +39,9 @@ def none_used(paths: Sequence[str], topics: Collection[str], losses: Iterable[tu
     losses
         What is lost, each with the name of its recording.
     """
-    lost = summed_up(losses)
-    why = lost or "none is there at the times that were asked for"
-    advice = "give a whole copy, or other maps with --topic" if lost else "give another --start or --stop"
+    why, advice = summed_up(losses), "give a whole copy, or other maps with --topic"
+    if not why:
+        why, advice = "there is none at these times", "give other maps with --topic, or another --start or --stop"
     return InputError(f"{', '.join(paths)}: no map of {listed(sorted(topics))} can be used; {why}; {advice}")
 
 

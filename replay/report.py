@@ -49,21 +49,18 @@ class ReportBuilder:
         self._skipped: Counter[str] = Counter()
         self._places: dict[tuple[str, str, str, str], Json] = {}
         self._listing = Listing()
-        self._refused: dict[str, Counter[str]] = {}
-        self._damaged: set[str] = set()
         self._first_merged_ns: dict[str, int] = {}
         self._history: list[Json] = []
         self._notes: list[Json] = []
         self._priors: Mapping[str, Prior] = {}
         self._searched: dict[Pair, Json] = {}
+        self._refused: dict[str, Counter[str]] = {}
+        self._damaged: set[str] = set()
 
     def skip(self, event: Skipped) -> None:
         """Count a message, or a part of a recording, that was not used."""
+        self._blame(event)
         self._skipped[event.cause] += _at_least(event)
-        if event.robot:
-            self._refused.setdefault(event.robot, Counter())[event.cause] += _at_least(event)
-        elif event.place and not event.topic and event.messages != 0:
-            self._damaged.add(event.input)
         topic, place = self._listing.at((event.cause, event.input), event.topic, event.place)
         key = str(event.cause), event.input, topic, place
         there = self._places.setdefault(
@@ -129,6 +126,15 @@ class ReportBuilder:
             "inputs": [dict(item) for item in inputs],
             "settings": dict(self._settings),
         }
+
+    def _blame(self, event: Skipped) -> None:
+        """Keep what may be why a robot has no map."""
+        if event.messages == 0:
+            return
+        if event.robot:
+            self._refused.setdefault(event.robot, Counter())[event.cause] += _at_least(event)
+        elif event.place and not event.topic:
+            self._damaged.add(event.input)
 
     def _why(self, robot: str, reason: Reason, recordings: Collection[str]) -> Reason:
         """Return the reason; of a robot without a map, with what became of its messages, which no merger knows."""

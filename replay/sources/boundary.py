@@ -63,7 +63,8 @@ def _line(path: Path, error: Exception, part: str) -> str:
         return f"{_forbidden(path, error)}; make it readable for you and try again"
     if isinstance(error, MemoryError):
         what = f"{part} takes" if part else "it takes"
-        return f"{path}: {what} more memory than there is; close other programs, or give a smaller --max-memory"
+        advice = "close other programs, or give a smaller --max-memory (of merge and info)"
+        return f"{path}: {what} more memory than there is; {advice}"
     if isinstance(error, OSError) and error.errno in _LIMITS:
         return f"{path}: it cannot be read: {error.strerror}; {_LIMITS[error.errno]} and try again"
     if isinstance(error, OSError) and error.strerror:

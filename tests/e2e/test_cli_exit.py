@@ -95,10 +95,10 @@ def test_flags_that_are_none(replay: Program, arguments: tuple[str, ...]) -> Non
     [
         (("--robots", "r1,,r2"), "--robots r1,,r2: expected names"),
         (("--robots", "r1,r1"), "each once"),
-        (("--start", "noon"), "'noon' is no time"),
-        (("--stop", "1.2.3"), "'1.2.3' is no number of seconds"),
-        (("--reorder-window", "-1"), "'-1' is no number of seconds"),
-        (("--every", "inf"), "'inf' is no number of seconds"),
+        (("--start", "noon"), "--start: 'noon' is no time"),
+        (("--stop", "1.2.3"), "--stop: '1.2.3' is no number of seconds"),
+        (("--reorder-window", "-1"), "--reorder-window: '-1' is no number of seconds"),
+        (("--every", "inf"), "--every: 'inf' is no number of seconds"),
         (("-o", "out.bag"), "ends in .mcap"),
     ],
 )

@@ -109,16 +109,37 @@ def test_no_more_than_that_is_read_at_once(replay: Program, tmp_path: Path, writ
     assert replay.merge(run, "--max-memory", "200MB", "--force").report["skipped"] == {}
 
 
+def test_info_reads_no_more_at_once_either(replay: Program, tmp_path: Path) -> None:
+    run = write_mcap(tmp_path / "run.mcap", two_robots(), chunk_bytes=2_000_000)
+    assert "over_memory" not in replay("info", run, "--max-memory", "9M").out
+    large = Grid(np.zeros((2000, 2000), np.int8), 0.05)
+    run = write_mcap(tmp_path / "large.mcap", [seen("r1", 0.0, large)])
+    ran = replay("info", run, "--max-memory", "2M")
+    assert "over_memory: it has more than 2000000 bytes" in ran.out
+    assert "nothing would be merged: " in ran.out
+
+
 @pytest.mark.parametrize("text", ["", "2", "-1GB", "1e9", "2 XB", "nan", "GiB", "1023KiB", "٣GB", "2GB 3"])
 def test_what_is_no_size(replay: Program, tmp_path: Path, text: str) -> None:
     ran = replay.merge(write_mcap(tmp_path / "run.mcap", [seen("r1", 0.0)]), f"--max-memory={text}")
     assert ran.status == 2
+    assert ran.error.startswith(f"--max-memory: {text!r} is ")
     assert "expected one such as 2GiB" in ran.error
 
 
 @pytest.mark.parametrize(
     ("text", "expected"),
-    [("2GiB", 2 << 30), ("500MB", 500_000_000), ("1.5 gb", 1_500_000_000), ("1048576", 1 << 20), ("2048kb", 2_048_000)],
+    [
+        ("2GiB", 2 << 30),
+        ("500MB", 500_000_000),
+        ("1.5 gb", 1_500_000_000),
+        ("1048576", 1 << 20),
+        ("2048kb", 2_048_000),
+        ("200M", 200_000_000),
+        ("3g", 3 * 10**9),
+        ("0.5T", 5 * 10**11),
+        ("2000 K", 2_000_000),
+    ],
 )
 def test_sizes(text: str, expected: int) -> None:
     from replay.footprint import size_to_bytes

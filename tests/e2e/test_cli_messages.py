@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.rosbag1 import Writer as Rosbag1Writer
 
 from mapmerge.grid import Grid
 from mapmerge.sim2 import Sim2
+from replay.codec import ros1_typestore
 from replay.skip_cause import SkipCause
-from tests.bags import Recorded, chunks, damage, write_mcap, write_rosbag1, write_rosbag2
+from tests.bags import Recorded, as_ros1, chunks, damage, write_mcap, write_rosbag1, write_rosbag2
 from tests.outputs import maps, raw, reports, same_map, transforms
 from tests.program import Program
 from tests.runs import (
@@ -84,6 +86,17 @@ def check_none(replay: Program, run: Path, words: str) -> None:
     assert words in ran.error
     assert not list(run.parent.glob("out*"))
     assert f"nothing would be merged: {ran.error}" in replay("info", run).out.splitlines()
+
+
+def test_a_topic_that_is_only_announced_is_no_map(replay: Program, tmp_path: Path) -> None:
+    with Rosbag1Writer(tmp_path / "run.bag") as writer:
+        for each in (seen("r1", 0.0), seen("r2", 1.0)):
+            connection = writer.add_connection(each.topic, each.msgtype, typestore=ros1_typestore())
+            if each.topic == "/r2/map":
+                writer.write(connection, each.log_time_ns, as_ros1(each))
+    ran = replay.merge(tmp_path / "run.bag", "--robots", "r1")
+    assert ran.status == 2
+    assert "no map of /r1/map can be used; there is none at these times; give other maps with --topic" in ran.error
 
 
 def test_only_updates_are_no_map(replay: Program, tmp_path: Path) -> None:
