@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 from replay.errors import InputError
@@ -12,6 +13,7 @@ from replay.skip_cause import SkipCause
 from replay.sources.base import RawMessage, SourceInfo
 from replay.sources.boundary import TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
+from replay.sources.lapses import lapse_of
 from replay.sources.losses import Loss, Losses
 from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content
 from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, indexed_entries, read_summary
@@ -181,14 +183,15 @@ class McapFile(Closing):
         self, entries: Iterable[Entry], wanted: Mapping[int, Channel], chunks: _Chunks
     ) -> Iterator[tuple[Entry, RawMessage]]:
         """Yield the messages at these places; what turns out to be damaged is left out and named."""
-        left = Counter(entry.block for entry in entries)
+        left, times_ns = Counter(entry.block for entry in entries), _times_ns(entries)
         for entry in entries:
             left[entry.block] -= 1
             try:
                 data = chunks.data(entry, is_last=not left[entry.block])
             except BadPart as error:
                 lost = indexed_counts(self._file, self._file.end_of(entry.block))
-                self.losses.add(chunk_loss(entry.block, error, lost, self._contents.channels))
+                loss = chunk_loss(entry.block, error, lost, self._contents.channels)
+                self.losses.add(replace(loss, lapse=lapse_of(times_ns[entry.block])))
                 continue
             if data is None:
                 continue
@@ -271,10 +274,19 @@ def _are_maps(channels: Mapping[int, Channel]) -> bool:
     return all(channel.is_map for channel in channels.values())
 
 
+def _times_ns(entries: Iterable[Entry]) -> dict[int, tuple[int, int]]:
+    """Return the first and last time in each chunk."""
+    times_ns: dict[int, tuple[int, int]] = {}
+    for entry in entries:
+        first_ns, last_ns = times_ns.get(entry.block, (entry.log_time_ns, entry.log_time_ns))
+        times_ns[entry.block] = min(first_ns, entry.log_time_ns), max(last_ns, entry.log_time_ns)
+    return times_ns
+
+
 def _bad_message(entry: Entry, channel: Channel, error: Exception) -> Loss:
     inside = "" if entry.inner == NO_CHUNK else f"at byte {entry.inner} of the chunk "
-    place = f"the message {inside}at byte {entry.block}"
+    place, lapse = f"the message {inside}at byte {entry.block}", lapse_of([entry.log_time_ns])
     if isinstance(error, TooLargeError):
-        return Loss(SkipCause.OVER_MEMORY, place, str(error), 1, channel.topic)
+        return Loss(SkipCause.OVER_MEMORY, place, str(error), 1, channel.topic, lapse=lapse)
     found = " ".join(str(error).split())
-    return Loss(SkipCause.DAMAGED, place, f"it cannot be decompressed ({found})", 1, channel.topic)
+    return Loss(SkipCause.DAMAGED, place, f"it cannot be decompressed ({found})", 1, channel.topic, lapse=lapse)

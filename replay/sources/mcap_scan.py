@@ -13,9 +13,10 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from replay.skip_cause import SkipCause
+from replay.sources.lapses import AT_END, Written, lapse_of
 from replay.sources.losses import Loss
 from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content, inner_records
 from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, Summary, file_crc, statistics_between
@@ -133,7 +134,8 @@ class _Found:
         length = record.end - record.start
         if length > self._file.most_bytes:
             detail = over_memory(self._file.most_bytes)
-            self._losses.append(Loss(SkipCause.OVER_MEMORY, f"the message at byte {record.start}", detail, 1))
+            loss = Loss(SkipCause.OVER_MEMORY, f"the message at byte {record.start}", detail, 1)
+            self._losses.append(replace(loss, lapse=lapse_of([message.log_time_ns])))
             return
         self._add(message, record.start, NO_CHUNK, self._others)
 
@@ -185,7 +187,8 @@ class _Found:
             for entry in (*self._covered.entries, *self._others.entries)
             if entry.channel in channels and self._wanted(channels[entry.channel])
         )
-        return Scan(contents, tuple(entries), walk.cut_chunk, tuple(self._all_losses(walk, contents)))
+        written = Written(((entry.block, entry.inner), entry.log_time_ns) for entry in entries)
+        return Scan(contents, tuple(entries), walk.cut_chunk, tuple(self._all_losses(walk, contents, written)))
 
     def _add_cut_chunk(self, start: int) -> None:
         try:
@@ -212,7 +215,7 @@ class _Found:
         times = [times for each in (self._covered, self._others) if (times := each.times_ns)]
         return min((first for first, _ in times), default=None), max((last for _, last in times), default=None)
 
-    def _all_losses(self, walk: Walk, contents: Contents) -> list[Loss]:
+    def _all_losses(self, walk: Walk, contents: Contents, written: Written) -> list[Loss]:
         unknown = list(unknown_types(contents))
         counted_all = self._summary.statistics if self._summary and self._summary.is_checked else None
         found = {key: count for key, count in contents.counts.items() if count}
@@ -221,8 +224,13 @@ class _Found:
         }:
             return unknown
         losses = [*self._losses]
-        losses += [chunk_loss(start, error, lost, contents.channels) for start, error, lost in self._bad_chunks]
-        losses += [self._gap_loss(gap) for gap in walk.gaps]
+        for start, error, lost in self._bad_chunks:
+            # whatever of a chunk that was cut off is there comes before what is not
+            lapse = AT_END if start == walk.cut_chunk else written.between((start, NO_CHUNK), (start + 1, NO_CHUNK))
+            losses.append(replace(chunk_loss(start, error, lost, contents.channels), lapse=lapse))
+        for gap in walk.gaps:
+            lapse = written.between((gap.start, NO_CHUNK), (gap.stop, NO_CHUNK))
+            losses.append(replace(self._gap_loss(gap), lapse=lapse))
         if walk.ends_early is not None:
             losses.append(_ends_early(walk.ends_early, self._file))
         if not losses:
@@ -250,7 +258,8 @@ class _Found:
         self._file.file.seek(end)
         if self._file.file.read(len(MAGIC) + 1) != MAGIC + bytes([HEADER]):
             return []
-        return [_damaged(end, self._file.size, "another recording begins there, after the end of this one: split them")]
+        loss = _damaged(end, self._file.size, "another recording begins there, after the end of this one: split them")
+        return [replace(loss, lapse=AT_END)]
 
 
 def _damaged(start: int, stop: int, detail: str, messages: int | None = None) -> Loss:
@@ -262,7 +271,7 @@ def _ends_early(end: int, file: RecordFile) -> Loss:
         f"the last whole record ends there, {counted(file.size - end, 'byte')} before the end of the file, and nothing "
         "closes the recording, as when recording or copying was cut off; copy it again if there is a whole one"
     )
-    return Loss(SkipCause.ENDS_EARLY, f"byte {end}", detail)
+    return Loss(SkipCause.ENDS_EARLY, f"byte {end}", detail, lapse=AT_END)
 
 
 def indexed_counts(file: RecordFile, start: int) -> Counter[int] | None:
@@ -290,6 +299,7 @@ def chunk_loss(start: int, error: BadPart, lost: Counter[int] | None, channels: 
         f"{error.detail}; in it are {named}{more}",
         lost.total(),
         next(iter(topics)) if len(topics) == 1 and lost.keys() <= channels.keys() else "",
+        tuple(topics) if lost.keys() <= channels.keys() else (),
     )
 
 

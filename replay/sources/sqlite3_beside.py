@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 
 from replay.errors import InputError
 from replay.skip_cause import SkipCause
+from replay.sources.lapses import AT_END
 from replay.sources.losses import Loss, Losses
 from replay.sources.sqlite3_salvage import read_header
 
@@ -103,10 +104,11 @@ def check_wal(path: Path, wal_path: Path, shown: Path, losses: Losses) -> Wal | 
     """
     wal, name = read_wal(wal_path), f"{shown.name}{WAL}"
     if wal is None:
-        losses.add(Loss(SkipCause.DAMAGED, name, "it does not begin like a write-ahead log of SQLite"))
+        losses.add(Loss(SkipCause.DAMAGED, name, "it does not begin like a write-ahead log of SQLite", lapse=AT_END))
         return None
     if wal.is_cut:
-        losses.add(Loss(SkipCause.ENDS_EARLY, name, f"the file ends early at byte {wal_path.stat().st_size}"))
+        detail = f"the file ends early at byte {wal_path.stat().st_size}"
+        losses.add(Loss(SkipCause.ENDS_EARLY, name, detail, lapse=AT_END))
     with path.open("rb") as file:
         header = read_header(file)
     there = path.stat().st_size // header.page_bytes if header else 0
@@ -123,12 +125,12 @@ def check_applied(database: sqlite3.Connection, wal: Wal, shown: Path, losses: L
     """Name it if SQLite did not take all whole changes of a write-ahead log, because a checksum is wrong."""
     _, applied, _ = database.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
     if applied < 0:
-        losses.add(Loss(SkipCause.DAMAGED, f"{shown.name}{WAL}", "it does not belong to the file"))
+        losses.add(Loss(SkipCause.DAMAGED, f"{shown.name}{WAL}", "it does not belong to the file", lapse=AT_END))
     elif applied < wal.frames:
         detail = (
             f"the checksum of its page {applied + 1} is wrong: that one and the {wal.frames - applied - 1} after it"
         )
-        losses.add(Loss(SkipCause.WRONG_CHECKSUM, f"{shown.name}{WAL}", f"{detail} are not used"))
+        losses.add(Loss(SkipCause.WRONG_CHECKSUM, f"{shown.name}{WAL}", f"{detail} are not used", lapse=AT_END))
 
 
 def check_journal(path: Path, journal_path: Path, shown: Path, losses: Losses) -> None:
