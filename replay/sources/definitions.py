@@ -11,25 +11,17 @@ definition is taken as the standard one, because many writers leave it out; so i
 from __future__ import annotations
 
 import functools
-import re
 from typing import TYPE_CHECKING, Literal
 
 from replay.sources.base import TF_TYPE, TF_TYPES
+from replay.sources.definition_text import Fields, NoDefinitionError, fields_in
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from rosbags.interfaces.typing import FieldDesc
 
-    Fields = Mapping[str, Sequence[tuple[str, FieldDesc]]]
-
 _LARGEST_CHARS = 1 << 18
-_SEPARATOR = "=" * 80
-_SEPARATOR_LINE = re.compile(r"^={3,}[ \t]*$", re.MULTILINE)
-# lines of IDL that the parser does not know: titles, and directives such as #include
-_IDL_TITLE = re.compile(r"^IDL: .*$", re.MULTILINE)
-_IDL_BESIDE = re.compile(r"^(IDL: |[ \t]*#).*$", re.MULTILINE)
-_IDL_BODY = re.compile(r"^\s*module\s+\w+\s*\{", re.MULTILINE)
 
 
 @functools.lru_cache(maxsize=256)
@@ -55,7 +47,9 @@ def differing_field(msgtype: str, definition: str, ros: Literal[1, 2]) -> str | 
     from replay.codec.typestores import ros1_typestore, ros2_typestore
 
     store = ros1_typestore() if ros == 1 else ros2_typestore()
-    standard = {name: fields for name, (_, fields) in store.fielddefs.items()}
+    standard = {
+        name: [(field, _type_name(kind)) for field, kind in fields] for name, (_, fields) in store.fielddefs.items()
+    }
     known = TF_TYPE if msgtype in TF_TYPES else msgtype
     if known not in standard or not definition.strip("\0 \t\r\n"):
         return None
@@ -69,30 +63,20 @@ def differing_field(msgtype: str, definition: str, ros: Literal[1, 2]) -> str | 
 
 def _parsed(msgtype: str, definition: str) -> Fields | None:
     """Return the fields of each type that a text defines; None if it is no definition."""
-    from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
-
-    text = definition.replace("\r\n", "\n").strip("\0")
-    if len(text) > _LARGEST_CHARS:
+    if len(definition) > _LARGEST_CHARS:
         return None
     try:
-        if _IDL_TITLE.search(text) or _IDL_BODY.search(text):
-            parts = _SEPARATOR_LINE.split(_IDL_BESIDE.sub("", text))
-            types = [get_types_from_idl(part) for part in parts if part.strip()]
-        else:
-            types = [get_types_from_msg(_SEPARATOR_LINE.sub(_SEPARATOR, text), msgtype)]
-    # a text that is no definition fails the parsers in any of these ways
-    except (TypesysError, ValueError, LookupError, AssertionError, TypeError, ArithmeticError, RecursionError):
+        return fields_in(msgtype, definition.strip("\0"))
+    except NoDefinitionError:
         return None
-    return {name: fields for part in types for name, (_, fields) in part.items()}
 
 
 def _first_difference(msgtype: str, recorded: Fields, standard: Fields) -> str | None:
     """Return the first difference of a type or, depth first, of one within it."""
     expected = standard[msgtype]
-    for (name, field), (own_name, own_field) in zip(expected, recorded[msgtype], strict=False):
+    for (name, kind), (own_name, own_kind) in zip(expected, recorded[msgtype], strict=False):
         if name != own_name:
             return f"a field of {msgtype} is {own_name} in the recording, {name} in the standard"
-        kind, own_kind = _type_name(field), _type_name(own_field)
         if kind != own_kind:
             return f"{name} of {msgtype} is {own_kind} in the recording, {kind} in the standard"
         inner = kind.partition("[")[0]
@@ -104,7 +88,7 @@ def _first_difference(msgtype: str, recorded: Fields, standard: Fields) -> str |
 
 
 def _missing_or_extra(
-    msgtype: str, recorded: Sequence[tuple[str, FieldDesc]], expected: Sequence[tuple[str, FieldDesc]]
+    msgtype: str, recorded: Sequence[tuple[str, str]], expected: Sequence[tuple[str, str]]
 ) -> str | None:
     if len(recorded) > len(expected):
         return f"{msgtype} has the field {recorded[len(expected)][0]} in the recording, and not in the standard"

@@ -3,10 +3,12 @@ from __future__ import annotations
 from typing import Literal
 
 import pytest
+from rosbags.typesys import get_types_from_msg
 
 from replay.codec import ros1_typestore, ros2_typestore
 from replay.sources.base import GRID_TYPE, TF_TYPE, UPDATE_TYPE
-from replay.sources.definitions import differing_field
+from replay.sources.definition_text import fields_in
+from replay.sources.definitions import _type_name, differing_field
 
 LINE = "=" * 80
 
@@ -112,3 +114,87 @@ def test_definitions_in_idl() -> None:
     assert differing_field(UPDATE_TYPE, IDL.partition("IDL: std_msgs")[0].split("Update\n", 1)[1], 2) is None
     assert "width" in str(differing_field(UPDATE_TYPE, IDL.replace("uint32 width", "uint16 width"), 2))
     assert "stamp" in str(differing_field(UPDATE_TYPE, IDL.replace("Time stamp", "Duration stamp"), 2))
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_fields_are_those_that_the_reference_finds(ros: Literal[1, 2]) -> None:
+    store = ros1_typestore() if ros == 1 else ros2_typestore()
+    names = sorted(set(store.fielddefs) - {"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"})
+    assert len(names) > 100
+    for name in names:
+        definition = store.generate_msgdef(name, ros_version=ros)[0]
+        head, *parts = definition.split(LINE + "\n")
+        # of a constant alone, and of two ways to write what is not in the bytes
+        text = LINE.join([f"# {name}\n{head}", *(f"\n{part}" for part in parts)])
+        expected = {key: fields for key, (_, fields) in get_types_from_msg(definition, name).items()}
+        assert fields_in(name, text) == {
+            key: [(field, _type_name(kind)) for field, kind in fields] for key, fields in expected.items()
+        }
+
+
+ODD_IDL = """\
+#include "x.idl"
+/* module nothing { */ // struct nothing
+module a { module msg {
+  @verbatim (language="comment", text="a ) \\" ; }" "b")
+  module C_Constants { const long X = (1 + (2)); const string S = "};"; };
+  enum Kind { ONE, TWO };
+  typedef double double__9[9];
+  typedef sequence<octet, 4> bytes;
+  struct Inner { long long x, y; };
+  @final struct C {
+    @key @default (value=(3)) unsigned short u;
+    double__9 covariance;
+    bytes data; Inner inner; a::msg::Inner other;
+    sequence<string<3>, C_Constants::X> names; boolean is_on; wstring w; std_msgs::msg::Header header; int8 z[3];
+  };
+}; };
+"""
+
+
+def test_fields_of_idl_are_found_whatever_is_beside_them() -> None:
+    assert fields_in("a/msg/C", ODD_IDL) == {
+        "a/msg/Inner": [("x", "int64"), ("y", "int64")],
+        "a/msg/C": [
+            ("u", "uint16"),
+            ("covariance", "float64[9]"),
+            ("data", "byte[]"),
+            ("inner", "a/msg/Inner"),
+            ("other", "a/msg/Inner"),
+            ("names", "string[]"),
+            ("is_on", "bool"),
+            ("w", "wstring"),
+            ("header", "std_msgs/msg/Header"),
+            ("z", "int8[3]"),
+        ],
+    }
+
+
+def module(content: str) -> str:
+    return f"module nav_msgs {{ module msg {{ {content} }}; }};"
+
+
+HOSTILE = {
+    "parentheses": module(f"const long X = {'(' * 50_000}1{')' * 50_000};"),
+    "annotations": module(f"struct A {{ @a({'(' * 50_000}{')' * 50_000}) long x; }};"),
+    "operators": module(f"const long X = 1{'+1' * 100_000};"),
+    "sequences": module(f"struct A {{ {'sequence<' * 20_000}long{'>' * 20_000} x; }};"),
+    "modules": "module a { " * 20_000 + "struct A { b::C d; };",
+    "typedefs": module("".join(f"typedef a{i} a{i + 1};" for i in range(9000))),
+    "comments": module("/*" * 100_000),
+    "strings": module(r"const string X = " + r"\"" * 100_000),
+    "newlines of idl": "\n" * 250_000 + "module",
+    "newlines": "\n" * 250_000 + "int8 data",
+    "fields": "int8 a\n" * 30_000,
+    "annotated": "@a " * 80_000,
+    "separators": f"{LINE}\n" * 3000,
+    "a name": f"int8 {'a' * 250_000};",
+    "a type": f"{'a/' * 120_000}; b",
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_a_text_made_to_take_long_is_read_as_any_other(kind: str) -> None:
+    """Each would take a parser that goes back on itself longer than anybody waits."""
+    assert len(HOSTILE[kind]) < 1 << 18
+    assert differing_field(GRID_TYPE, HOSTILE[kind], 2) is not None
