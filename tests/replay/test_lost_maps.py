@@ -36,6 +36,8 @@ from tests.bags import (
 
 LOST_S = 10
 """The full map of this time is lost; what follows until the next one has nothing that it belongs to."""
+LOST_ROWS = 65
+"""So large that of a SQLite file it takes a page of its own."""
 
 
 Cells = npt.NDArray[np.int8]
@@ -45,7 +47,7 @@ def recorded(robots: int) -> list[Recorded]:
     """Return of each robot, in seconds: maps at 0, 10 and 30, and updates at 5, 20 and 40."""
     found = []
     for robot in (f"/r{number + 1}" for number in range(robots)):
-        maps = [(0, 1, 40), (LOST_S, 2, 50), (30, 3, 45)]
+        maps = [(0, 1, 40), (LOST_S, 2, LOST_ROWS), (30, 3, 45)]
         found += [recorded_map(f"{robot}/map", START + at * SECOND, seed, rows) for at, seed, rows in maps]
         found += [recorded_update(f"{robot}/map_updates", START + at * SECOND, at) for at in (5, 20, 40)]
     return sorted(found, key=lambda each: each.log_time_ns)
@@ -60,12 +62,12 @@ def bad_row(path: Path) -> Path:
 
 
 def bad_page(path: Path) -> Path:
-    """Overwrite the page on which the row of the map begins, so that pages are read instead of rows."""
+    """Overwrite the beginning of the page on which the row of the map is, so that pages are read instead of rows."""
     db3 = write_bare_db3(path / "run.db3", recorded(1))
     data = bytearray(db3.read_bytes())
-    known = grid(2, 50).cells.tobytes()
-    at = data.index(known[:200])
-    data[at + 300 : at + 340] = b""
+    page_bytes = int.from_bytes(data[16:18], "big")
+    start = data.index(grid(2, LOST_ROWS).cells.tobytes()) // page_bytes * page_bytes
+    data[start : start + 8] = bytes(8)
     db3.write_bytes(data)
     return db3
 
@@ -124,8 +126,8 @@ DAMAGED: dict[str, Callable[[Path], Path]] = {
     "page": bad_page,
     "chunk": bad_chunk,
     "chunk by a pass": lambda path: cut_off(bad_chunk(path)),
-    "chunk of two robots": lambda path: bad_chunk(path, 2, 5000),
-    "chunk of two robots by a pass": lambda path: cut_off(bad_chunk(path, 2, 5000)),
+    "chunk of two robots": lambda path: bad_chunk(path, 2, 4700),
+    "chunk of two robots by a pass": lambda path: cut_off(bad_chunk(path, 2, 4700)),
     "gap": bad_start_of_chunk,
     "bz2": lambda path: bad_chunk_of_bag(path, "bz2"),
     "bz2 by a pass": lambda path: cut_off(bad_chunk_of_bag(path, "bz2")),
