@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
@@ -105,7 +104,9 @@ class McapFile(Closing):
             entries = self._indexed(topics)
             if entries is not None:
                 try:
-                    for entry, message in self._read(entries, self._wanted(topics), _Chunks(self._file, entries)):
+                    for entry, message in self._read(
+                        entries, self._wanted(topics), _Chunks(self._file, entries, is_claimed=True)
+                    ):
                         done.append(entry)
                         yield message
                 except _IndexLies:
@@ -116,7 +117,7 @@ class McapFile(Closing):
             had = {(entry.block, entry.inner) for entry in done}
             wanted = self._wanted(topics, known.contents)
             left = [each for each in known.entries if each.channel in wanted and (each.block, each.inner) not in had]
-            for _, message in self._read(left, wanted, _Chunks(self._file, (), known.cut_chunk)):
+            for _, message in self._read(left, wanted, _Chunks(self._file, left, known.cut_chunk)):
                 yield message
 
     def close(self) -> None:
@@ -183,11 +184,10 @@ class McapFile(Closing):
         self, entries: Iterable[Entry], wanted: Mapping[int, Channel], chunks: _Chunks
     ) -> Iterator[tuple[Entry, RawMessage]]:
         """Yield the messages at these places; what turns out to be damaged is left out and named."""
-        left, times_ns = Counter(entry.block for entry in entries), _times_ns(entries)
+        times_ns = _times_ns(entries)
         for entry in entries:
-            left[entry.block] -= 1
             try:
-                data = chunks.data(entry, is_last=not left[entry.block])
+                data = chunks.data(entry)
             except BadPart as error:
                 lost = indexed_counts(self._file, self._file.end_of(entry.block))
                 loss = chunk_loss(entry.block, error, lost, self._contents.channels)
@@ -211,22 +211,27 @@ class _Chunks:
 
     Parameters
     ----------
-    claims
-        What indexes say is in the chunks. It is checked when a chunk is loaded, before any message of it is used.
+    entries
+        The messages that will be asked for, once each.
     cut_chunk
         The chunk at which the file was cut off.
+    is_claimed
+        Whether only indexes say where they are. It is checked when a chunk is loaded, before any message of it is used.
     """
 
-    def __init__(self, file: RecordFile, claims: Iterable[Entry], cut_chunk: int | None = None) -> None:
+    def __init__(
+        self, file: RecordFile, entries: Collection[Entry], cut_chunk: int | None = None, *, is_claimed: bool = False
+    ) -> None:
         self._file = file
         self._cut_chunk = cut_chunk
-        self._held = ChunkCache(self._loaded)
+        inside = (entry.block for entry in entries if entry.inner != NO_CHUNK)
+        self._held = ChunkCache(self._loaded, inside, file.most_bytes)
         self._bad: set[int] = set()
         self._claims: dict[int, list[Entry]] = {}
-        for entry in claims:
+        for entry in entries if is_claimed else ():
             self._claims.setdefault(entry.block, []).append(entry)
 
-    def data(self, entry: Entry, *, is_last: bool) -> bytes | None:
+    def data(self, entry: Entry) -> bytes | None:
         """Return the data of a message; None if it is in a chunk that is known to be bad.
 
         Raises
@@ -243,8 +248,6 @@ class _Chunks:
         except BadPart:
             self._bad.add(entry.block)
             raise
-        if is_last:
-            self._held.forget(entry.block)
         return self._checked(content, entry.inner)
 
     def _checked(self, container: bytes, start: int) -> bytes:

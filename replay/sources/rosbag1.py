@@ -55,7 +55,7 @@ class Rosbag1File(Closing):
         self.path = copy_of or path
         self.losses = Losses()
         self._plain = path
-        self._most_bytes = most_bytes
+        self.most_bytes = most_bytes
         with ExitStack() as stack, translated(self.path, _foreign()):
             file = stack.enter_context(path.open("rb"))
             self._file, header = _begin(self.path, BagFile(file, path.stat().st_size, len(_MAGIC_2_0), 0))
@@ -108,7 +108,7 @@ class Rosbag1File(Closing):
         """
         place = contents.chunks[start]
         with translated(self.path, _foreign(), part=place.name):
-            chunk = read_chunk(self._file.file, place, self._most_bytes)
+            chunk = read_chunk(self._file.file, place, self.most_bytes)
         if chunk.problem is not None and isinstance(contents, Index):
             usable = sum(each is not None and each.op == MESSAGE for each in records_in(chunk.records, place))
             lost = max(0, contents.chunk_counts[start] - usable)
@@ -134,7 +134,7 @@ class Rosbag1File(Closing):
 
     def _scanned(self, reason: str, *, is_ended: bool = False) -> Scan:
         """Return what a pass through the file finds, and name why it is made."""
-        scan = Scan(self._file, self.losses, self._most_bytes)
+        scan = Scan(self._file, self.losses, self.most_bytes)
         if is_ended or scan.is_cut:
             detail = f"the file ends early: {reason}"
             self.losses.add(
@@ -193,7 +193,6 @@ class _Reading:
         self._contents = contents
         # what a pass found was seen to be there
         self._is_scanned = isinstance(contents, Scan)
-        self._chunks = ChunkCache(self._load)
         self._problems: set[int] = set()
         self._unchecked: dict[int, list[Entry]] = {}
         self._checked: set[int] = set()
@@ -204,8 +203,9 @@ class _Reading:
         if not self._is_scanned:
             for entry in entries:
                 self._unchecked.setdefault(entry.chunk, []).append(entry)
+        chunks = ChunkCache(self._load, (entry.chunk for entry in entries), self._bag.most_bytes)
         for entry in entries:
-            chunk = self._chunks[entry.chunk]
+            chunk = chunks[entry.chunk]
             if entry.chunk in self._unchecked:
                 self._check(chunk, self._unchecked.pop(entry.chunk))
             record = _message_at(chunk, entry)
