@@ -5,7 +5,9 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +19,7 @@ from replay.options import RunOptions
 from replay.plan import open_plan
 from replay.runs import RunPath
 from replay.skip_cause import SkipCause
+from replay.sources import open_source
 from replay.sources.lapses import AT_END, EARLIEST, LATEST, Lapse, Lapses, Written, lapse_of
 from replay.timeline import Tick, ticks
 from tests.bags import (
@@ -39,6 +42,9 @@ LOST_S = 10
 LOST_ROWS = 65
 """So large that of a SQLite file it takes a page of its own."""
 
+
+INDEX_BYTES = 31
+"""Length of the index of a chunk of one message."""
 
 Cells = npt.NDArray[np.int8]
 
@@ -94,6 +100,16 @@ def bad_start_of_chunk(path: Path) -> Path:
     return cut_off(mcap)
 
 
+def doubtful_chunk(path: Path, missing_bytes: int) -> Path:
+    """Take bytes from the end of a chunk without a checksum, which has what follows it in their place."""
+    options: dict[str, Any] = {"compression": "none", "chunk_bytes": 100, "enable_crcs": False}
+    mcap = write_mcap(path / "run.mcap", recorded(1), **options)
+    chunk = [chunk for chunk in chunks(mcap) if "/r1/map" in chunk.topics][1]
+    data, at = mcap.read_bytes(), chunk.start + chunk.size - 40
+    mcap.write_bytes(data[:at] + data[at + missing_bytes :])
+    return mcap
+
+
 def bad_chunk_of_bag(path: Path, compression: str) -> Path:
     bag = write_rosbag1(path / "run.bag", recorded(1), compression, chunk_bytes=100)
     damage(bag, [chunk for chunk in chunks(bag) if "/r1/map" in chunk.topics][1])
@@ -129,6 +145,8 @@ DAMAGED: dict[str, Callable[[Path], Path]] = {
     "chunk of two robots": lambda path: bad_chunk(path, 2, 6500),
     "chunk of two robots by a pass": lambda path: cut_off(bad_chunk(path, 2, 6500)),
     "gap": bad_start_of_chunk,
+    "doubtful end of a chunk": lambda path: doubtful_chunk(path, 4),
+    "index in a chunk": lambda path: doubtful_chunk(path, INDEX_BYTES),
     "bz2": lambda path: bad_chunk_of_bag(path, "bz2"),
     "bz2 by a pass": lambda path: cut_off(bad_chunk_of_bag(path, "bz2")),
     "missing part": missing_part,
@@ -163,6 +181,23 @@ def cells(seed: int, *updates: int) -> Cells:
     for each in updates:
         found[2:6, 3:8] = grid(each, 4, 5).cells
     return found
+
+
+def test_of_a_file_that_lost_a_page_in_its_middle_only_maps_around_that_are_parted(tmp_path: Path) -> None:
+    times_ns = [START + each * SECOND for each in range(8)]
+    messages = [recorded_map("/r1/map", time_ns, seed, rows=400) for seed, time_ns in enumerate(times_ns)]
+    whole = write_bare_db3(tmp_path / "whole.db3", messages).read_bytes()
+    page_bytes = int.from_bytes(whole[16:18], "big")
+    path = tmp_path / "run.db3"
+    for lost in (2, 4, 5):
+        within = messages[lost].fields["data"].tobytes()[12_000:12_300]
+        at = whole.index(within) // page_bytes * page_bytes
+        path.write_bytes(whole[:at] + whole[at + page_bytes :])
+        with open_source(path) as source:
+            found = [message.log_time_ns for message in source.messages(["/r1/map"])]
+            parted = [(first, last) for first, last in pairwise(found) if source.losses.part("/r1/map", first, last)]
+        assert found == [*times_ns[:lost], *times_ns[lost + 1 :]]
+        assert parted == [(times_ns[lost - 1], times_ns[lost + 1])]
 
 
 def test_what_is_lost_was_recorded_between_what_is_left() -> None:
