@@ -253,7 +253,12 @@ def _output_arguments(parser: argparse.ArgumentParser) -> None:
         "memory than this, such as 2GiB or 500MB, and what of a recording is larger to read at once (default: any map, "
         "merged maps of up to 10⁹ cells, and chunks and messages of up to 1 GiB)",
     )
-    rules.add_argument("--strict", action="store_true", help="end with an error at the first message that is unusable")
+    rules.add_argument(
+        "--strict",
+        action="store_true",
+        help="end with an error at the first message that is unusable, and at damage of a recording, even if that "
+        "costs no message",
+    )
     rules.add_argument(
         "--require-all", action="store_true", help="exit with 1 unless two robots or more were merged, all"
     )

@@ -23,6 +23,7 @@ from replay.odd_cells import OddCells
 from replay.options import NS_PER_S
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, RawMessage, Source
+from replay.sources.lapses import Lapse
 from replay.stamps import LAST_NS, Stamp, StampCheck
 from replay.words import moment
 
@@ -102,6 +103,15 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class KnownMap:
+    """A robot's map, with all updates of it; ``topic`` and ``log_time_ns`` are those of the full map."""
+
+    grid: Grid
+    topic: str
+    log_time_ns: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Arrival:
     """A message, or why it cannot be used, at the time at which it takes effect."""
 
@@ -115,14 +125,24 @@ class Arrival:
         """Whose map it is; "" if it is none."""
         return self.feed.robot_of.get(self.raw.topic, "")
 
-    @property
-    def loses_map_of(self) -> frozenset[str]:
-        """Whose full map may be lost with it, so that no update belongs to the one before."""
-        if not isinstance(self.content, Skipped):
-            return frozenset()
-        if self.raw.msgtype == GRID_TYPE:
-            return frozenset([self.robot])
-        return frozenset() if self.content.topic or not self.content.place else frozenset(self.feed.robot_of.values())
+    def applied(self, known: KnownMap | None) -> KnownMap:
+        """Return the robot's map after this message, which is a map or an update of one.
+
+        Raises
+        ------
+        BadMessage
+            If it cannot be: an update without a map, or between which and its map another one may be lost.
+        """
+        if not isinstance(self.content, GridMessage | UpdateMessage):
+            raise TypeError("neither a map nor an update")
+        is_new = isinstance(self.content, GridMessage)
+        last = None if known is None or is_new or self._is_parted_from(known) else known
+        full = last or self.raw
+        return KnownMap(self.feed.assembled(last.grid if last else None, self.content), full.topic, full.log_time_ns)
+
+    def _is_parted_from(self, known: KnownMap) -> bool:
+        """Tell whether another full map may be lost between one and this update."""
+        return self.feed.source.losses.part(known.topic, known.log_time_ns, self.raw.log_time_ns)
 
     def skipped(self, error: BadMessage) -> Skipped:
         """Return why the message, or a part of it, is not used after all."""
@@ -161,16 +181,14 @@ def _stamped(feed: Feed, tally: Tally, window: Window) -> Iterator[Arrival]:
         content = _decoded(feed, raw)
         time_ns = times.of(raw, content)
         if time_ns is None:
-            content, time_ns = _skipped(feed, raw, _NO_TIME), times.newest_ns
+            content, time_ns = _unusable(feed, raw, _NO_TIME), times.newest_ns
         yield from (Arrival(time_ns, feed, raw, note) for note in times.new_notes())
         if (odd := odd_cells.note(raw, content)) is not None:
             yield Arrival(time_ns, feed, raw, Noted(feed.robot_of[raw.topic], odd))
         early = window.start_ns is not None and time_ns < window.start_ns
         if early and isinstance(content, GridMessage | UpdateMessage):
             tally.count(raw)
-            before.take(Arrival(time_ns, feed, raw, content), content)
-        elif early and raw.msgtype == GRID_TYPE:
-            before.lose(feed.robot_of[raw.topic])
+            before.take(Arrival(time_ns, feed, raw, content))
         unwanted = early and not isinstance(content, TransformMessage)
         if unwanted or (window.stop_ns is not None and time_ns >= window.stop_ns):
             continue
@@ -199,7 +217,14 @@ def _decoded(feed: Feed, raw: RawMessage) -> Content:
             feed.memory.refuse_over(message.grid)
         return message
     except BadMessage as error:
-        return _skipped(feed, raw, error)
+        return _unusable(feed, raw, error)
+
+
+def _unusable(feed: Feed, raw: RawMessage, error: BadMessage) -> Skipped:
+    """Return why a message is not used; no update belongs to the full map before it, if it is one."""
+    if raw.msgtype == GRID_TYPE:
+        feed.source.losses.add_lapse(raw.topic, Lapse(raw.log_time_ns, raw.log_time_ns))
+    return _skipped(feed, raw, error)
 
 
 class _Times:
@@ -296,30 +321,26 @@ class _Before:
     """The last map of each robot before the times that are used."""
 
     def __init__(self) -> None:
-        self._last: dict[str, tuple[Arrival, Grid]] = {}
-        self._lost: set[str] = set()
+        self._last: dict[str, tuple[int, Arrival, KnownMap]] = {}
 
-    def lose(self, robot: str) -> None:
-        """Take note that a full map is lost: no update belongs to the one that is kept."""
-        self._lost.add(robot)
-
-    def take(self, arrival: Arrival, content: GridMessage | UpdateMessage) -> None:
+    def take(self, arrival: Arrival) -> None:
         """Keep a map, or an update of the one that is kept; what cannot be used is left out, as all of that time is."""
         kept = self._last.get(arrival.robot)
-        older = kept is not None and arrival.stamp_ns < kept[0].stamp_ns
-        if older and isinstance(content, GridMessage):
+        is_map = isinstance(arrival.content, GridMessage)
+        if kept is not None and is_map and arrival.stamp_ns < kept[0]:
             return
         try:
-            grid = arrival.feed.assembled(kept[1] if kept and arrival.robot not in self._lost else None, content)
+            known = arrival.applied(kept[2] if kept else None)
         except BadMessage:
             return
-        self._lost.discard(arrival.robot)
-        self._last[arrival.robot] = arrival, grid
+        # of its map, because what may be lost behind that decides which updates belong to it
+        full = arrival if kept is None or is_map else kept[1]
+        self._last[arrival.robot] = arrival.stamp_ns, full, known
 
     def release(self, start_ns: int | None) -> Iterator[Arrival]:
         """Yield what was kept, once, as maps of the time ``start_ns``."""
-        for arrival, grid in self._last.values():
-            yield replace(arrival, stamp_ns=start_ns or 0, content=GridMessage(arrival.stamp_ns, "", grid))
+        for time_ns, full, known in self._last.values():
+            yield replace(full, stamp_ns=start_ns or 0, content=GridMessage(time_ns, "", known.grid))
         self._last.clear()
 
 

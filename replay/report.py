@@ -121,7 +121,7 @@ class ReportBuilder:
             "history": list(self._history),
             "notes": list(self._notes),
             "updates": self._updates.total(),
-            "skipped": dict(sorted(self._skipped.items())),
+            "skipped": dict(sorted((+self._skipped).items())),
             "skipped_at": [dict(item) for item in self._places.values()],
             "inputs": [dict(item) for item in inputs],
             "settings": dict(self._settings),
@@ -167,8 +167,8 @@ class ReportBuilder:
 
 
 def _at_least(event: Skipped) -> int:
-    """Return how many messages were lost, at least one."""
-    return max(1, event.messages or 0)
+    """Return how many messages were lost; one if that cannot be told."""
+    return 1 if event.messages is None else event.messages
 
 
 def _reason(reason: Reason) -> Json:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from mapmerge.grid import Grid
-from replay.arrivals import Arrival, Feed, Tally, Window, in_order
+from replay.arrivals import Arrival, Feed, KnownMap, Tally, Window, in_order
 from replay.errors import BadMessage, InputError
 from replay.events import Noted, Skipped
 from replay.messages import FrameLink, TransformMessage
@@ -87,7 +87,7 @@ def _items(
     feeds: Sequence[Feed], tallies: Sequence[Tally], window: Window, *, strict: bool
 ) -> Iterator[Tick | Skipped | Noted | Transforms]:
     streams = [in_order(feed, tally, window) for feed, tally in zip(feeds, tallies, strict=True)]
-    latest: dict[str, Grid] = {}
+    latest: dict[str, KnownMap] = {}
     messages = 0
     for time_ns, arrivals in groupby(heapq.merge(*streams, key=_stamp), key=_stamp):
         changed: dict[str, Grid] = {}
@@ -109,12 +109,10 @@ def _stamp(arrival: Arrival) -> int:
 
 
 def _taken(
-    arrival: Arrival, latest: dict[str, Grid], changed: dict[str, Grid]
+    arrival: Arrival, latest: dict[str, KnownMap], changed: dict[str, Grid]
 ) -> Iterator[Skipped | Noted | Transforms]:
     """Apply a message to the latest maps; yield its transforms, or why it was not used."""
     content = arrival.content
-    for robot in arrival.loses_map_of:
-        latest.pop(robot, None)
     if isinstance(content, Skipped | Noted):
         yield content
     elif isinstance(content, TransformMessage):
@@ -124,8 +122,8 @@ def _taken(
         yield Transforms(arrival.feed.source, None if always else arrival.stamp_ns, content.links)
     else:
         try:
-            latest[arrival.robot] = arrival.feed.assembled(latest.get(arrival.robot), content)
+            latest[arrival.robot] = arrival.applied(latest.get(arrival.robot))
         except BadMessage as error:
             yield arrival.skipped(error)
             return
-        changed[arrival.robot] = latest[arrival.robot]
+        changed[arrival.robot] = latest[arrival.robot].grid

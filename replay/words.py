@@ -30,7 +30,9 @@ def unused(topics: Sequence[str]) -> str:
 
 def lost(messages: int | None) -> str:
     """Return how many messages are lost, if that is known."""
-    return "lost messages" if messages is None else f"lost {counted(messages, 'message')}"
+    if messages is None:
+        return "lost messages"
+    return f"lost {counted(messages, 'message') if messages else 'no message'}"
 
 
 def recovered(name: str, messages: int, until_ns: int | None, parts: Sequence[str] = ()) -> str:

@@ -75,7 +75,7 @@ def map_fields(known: Grid, stamp_ns: int = 0, frame_id: str = "map") -> dict[st
     }
 
 
-def _update(topic: str, log_time_ns: int, seed: int) -> Recorded:
+def recorded_update(topic: str, log_time_ns: int, seed: int) -> Recorded:
     known = grid(seed, 4, 5)
     fields = {"stamp_ns": log_time_ns, "frame_id": "map", "x": 3, "y": 2, "width": 5, "height": 4}
     return Recorded(topic, UPDATE_TYPE, log_time_ns, {**fields, "data": known.cells.reshape(-1)})
@@ -91,7 +91,7 @@ SAMPLE: tuple[Recorded, ...] = (
     recorded_map("/r2/map", START + 2 * SECOND, seed=2),
     recorded_map("/r1/map", START, seed=3),
     _chatter(START + 3 * SECOND, "between "),
-    _update("/r1/map_updates", START + 3 * SECOND, seed=4),
+    recorded_update("/r1/map_updates", START + 3 * SECOND, seed=4),
     recorded_map("/r2/map", START + 1 * SECOND + 1, seed=5, rows=50),
     recorded_map("/r2/map", START + 4 * SECOND, seed=6),
     recorded_map("/r1/map", START + 4 * SECOND, seed=7),

@@ -12,6 +12,7 @@ from replay.skip_cause import SkipCause
 from replay.sources.base import RawMessage, Source, SourceInfo
 from replay.sources.beginnings import HEAD_BYTES, nothing_there
 from replay.sources.boundary import COMMON, COPY_AGAIN, Closing, translated
+from replay.sources.lapses import AT_END
 from replay.sources.losses import Loss
 from replay.sources.mcap_file import McapFile
 from replay.sources.memory import MOST_BYTES
@@ -81,7 +82,7 @@ def name_early_end(source: Source) -> None:
     """Name it that the compression ends early, unless it shows in what was decompressed."""
     if not any(each.cause == SkipCause.ENDS_EARLY for each in source.losses.all):
         detail = f"the file ends early at byte {source.path.stat().st_size}; {COPY_AGAIN}"
-        source.losses.add(Loss(SkipCause.ENDS_EARLY, "its compression", detail))
+        source.losses.add(Loss(SkipCause.ENDS_EARLY, "its compression", detail, lapse=AT_END))
 
 
 def too_early(path: Path) -> InputError:

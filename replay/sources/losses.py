@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from replay.skip_cause import SkipCause
+from replay.sources.lapses import Lapse, Lapses
 from replay.words import counted
 
 
@@ -26,6 +27,10 @@ class Loss:
         How many messages are lost; None if that cannot be told.
     topic
         Whose they are, if they are of one topic; "" if not, or if that cannot be told.
+    maybe_of
+        If they are of several topics, of which, if that can be told.
+    lapse
+        When they were recorded, as far as that can be told.
     """
 
     cause: SkipCause
@@ -33,6 +38,8 @@ class Loss:
     detail: str
     messages: int | None = None
     topic: str = ""
+    maybe_of: tuple[str, ...] = field(default=(), compare=False)
+    lapse: Lapse = field(default=Lapse(), compare=False)
 
 
 MOST_PLACES = 20
@@ -90,9 +97,15 @@ class Losses:
         self._listing = Listing()
         self._others: dict[tuple[SkipCause, str], Loss] = {}
         self._new: list[Loss] = []
+        self._lapses: dict[str, Lapses] = {}
+        self._new_lapses: list[tuple[str, Lapse]] = []
 
     def add(self, loss: Loss) -> None:
         """Take in a loss, unless it is known."""
+        if loss.messages != 0:
+            # that of a loss that is known may differ, if it was met while other topics were read
+            for topic in loss.maybe_of or (loss.topic,):
+                self.add_lapse(topic, loss.lapse)
         if hash(loss) in self._met:
             return
         self._met.add(hash(loss))
@@ -107,9 +120,23 @@ class Losses:
         messages = (others.messages or 0) + (loss.messages or 0) if is_known else None
         self._others[kind] = replace(others, messages=messages)
 
+    def add_lapse(self, topic: str, lapse: Lapse) -> None:
+        """Take in when messages of a topic may be lost; of any topic with "" for it."""
+        self._lapses.setdefault(topic, Lapses()).add(lapse)
+        self._new_lapses.append((topic, lapse))
+
+    def part(self, topic: str, map_ns: int, update_ns: int) -> bool:
+        """Tell whether a full map of a topic may be lost between one and an update, of these log times."""
+        return any(self._lapses[each].part(map_ns, update_ns) for each in {topic, ""} & self._lapses.keys())
+
     def new(self) -> tuple[Loss, ...]:
         """Return the losses that were met since this was asked last."""
         found, self._new = tuple(self._new), []
+        return found
+
+    def new_lapses(self) -> tuple[tuple[str, Lapse], ...]:
+        """Return when messages of which topics may be lost, as far as it was met since this was asked last."""
+        found, self._new_lapses = tuple(self._new_lapses), []
         return found
 
     @property

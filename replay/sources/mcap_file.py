@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 from replay.errors import InputError
@@ -12,6 +13,7 @@ from replay.skip_cause import SkipCause
 from replay.sources.base import RawMessage, SourceInfo
 from replay.sources.boundary import TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
+from replay.sources.lapses import lapse_of
 from replay.sources.losses import Loss, Losses
 from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content
 from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, indexed_entries, read_summary
@@ -110,7 +112,7 @@ class McapFile(Closing):
             known = self._passed_through(topics)
             wanted = self._wanted(topics, known.contents)
             left = self._in_order_after(done, [each for each in known.entries if each.channel in wanted])
-            for _, message in self._read(left, wanted, _Chunks(self._file, (), cut_chunk=known.cut_chunk)):
+            for _, message in self._read(left, wanted, _Chunks(self._file, left, cut_chunk=known.cut_chunk)):
                 yield message
 
     def _claimed(self, entries: Collection[Entry]) -> _Chunks:
@@ -126,10 +128,11 @@ class McapFile(Closing):
         had = {(entry.block, entry.inner) for entry in done}
         reached_ns = max((entry.log_time_ns for entry in done), default=0)
         left = [each for each in entries if (each.block, each.inner) not in had]
-        late = sum(each.log_time_ns < reached_ns for each in left)
-        if late:
+        late_ns = [each.log_time_ns for each in left if each.log_time_ns < reached_ns]
+        if late_ns:
             detail = "the indexes say wrongly when they were recorded, which was met too late to use them in order"
-            self.losses.add(Loss(SkipCause.DAMAGED, "the message indexes", detail, late))
+            loss = Loss(SkipCause.DAMAGED, "the message indexes", detail, len(late_ns), lapse=lapse_of(late_ns))
+            self.losses.add(loss)
         return [each for each in left if each.log_time_ns >= reached_ns]
 
     def close(self) -> None:
@@ -196,15 +199,14 @@ class McapFile(Closing):
         self, entries: Iterable[Entry], wanted: Mapping[int, Channel], chunks: _Chunks
     ) -> Iterator[tuple[Entry, RawMessage]]:
         """Yield the messages at these places; what turns out to be damaged is left out and named."""
-        left = Counter(entry.block for entry in entries)
+        times_ns = _times_ns(entries)
         for entry in entries:
-            left[entry.block] -= 1
             for block in chunks.begun(entry.log_time_ns):
-                self._check(chunks, block)
+                self._check(chunks, block, times_ns[block])
             try:
-                data = chunks.data(entry, is_last=not left[entry.block])
+                data = chunks.data(entry)
             except BadPart as error:
-                self.losses.add(self._chunk_loss(entry.block, error))
+                self.losses.add(self._chunk_loss(entry.block, error, times_ns[entry.block]))
                 continue
             if data is None:
                 continue
@@ -218,15 +220,15 @@ class McapFile(Closing):
                     continue
             yield entry, RawMessage(channel.topic, channel.msgtype, encoding, entry.log_time_ns, data)
 
-    def _check(self, chunks: _Chunks, block: int) -> None:
+    def _check(self, chunks: _Chunks, block: int, times_ns: tuple[int, int]) -> None:
         try:
             chunks.check(block)
         except BadPart as error:
-            self.losses.add(self._chunk_loss(block, error))
+            self.losses.add(self._chunk_loss(block, error, times_ns))
 
-    def _chunk_loss(self, block: int, error: BadPart) -> Loss:
+    def _chunk_loss(self, block: int, error: BadPart, times_ns: tuple[int, int]) -> Loss:
         lost = indexed_counts(self._file, self._file.end_of(block))
-        return chunk_loss(block, error, lost, self._contents.channels)
+        return replace(chunk_loss(block, error, lost, self._contents.channels), lapse=lapse_of(times_ns))
 
 
 class _Chunks:
@@ -234,11 +236,12 @@ class _Chunks:
 
     Parameters
     ----------
-    claims
-        What indexes say is in the chunks. It is checked when a chunk is loaded, before any message of it is used.
+    entries
+        The messages that will be asked for, once each.
     begins_ns
-        When the first message of these chunks was recorded. No message of a later time may be used before what is
-        claimed of a chunk is checked, because a claim that is wrong may hide an earlier one.
+        When the first message of each chunk was recorded, if only indexes say what is in the chunks; else None. What
+        they claim is checked when a chunk is loaded. No message of a later time may be used before that, because a
+        claim that is wrong may hide an earlier one.
     cut_chunk
         The chunk at which the file was cut off.
     """
@@ -246,19 +249,22 @@ class _Chunks:
     def __init__(
         self,
         file: RecordFile,
-        claims: Iterable[Entry],
+        entries: Collection[Entry],
         begins_ns: Mapping[int, int] | None = None,
         cut_chunk: int | None = None,
     ) -> None:
         self._file = file
         self._cut_chunk = cut_chunk
-        self._held = ChunkCache(self._loaded)
         self._bad: set[int] = set()
         self._claims: dict[int, list[Entry]] = {}
-        for entry in claims:
+        for entry in () if begins_ns is None else entries:
             self._claims.setdefault(entry.block, []).append(entry)
         begins = ((begin_ns, block) for block, begin_ns in (begins_ns or {}).items() if block in self._claims)
         self._unchecked = sorted(begins, reverse=True)
+        # a chunk is asked for once for each of its messages, and once to be checked
+        inside = (entry.block for entry in entries if entry.inner != NO_CHUNK)
+        uses = chain(inside, (block for _, block in self._unchecked))
+        self._held = ChunkCache(self._loaded, uses, file.most_bytes)
 
     def begun(self, time_ns: int) -> Iterator[int]:
         """Yield the chunks that begin by this time, each once."""
@@ -276,7 +282,7 @@ class _Chunks:
         if block not in self._bad:
             self._content(block)
 
-    def data(self, entry: Entry, *, is_last: bool) -> bytes | None:
+    def data(self, entry: Entry) -> bytes | None:
         """Return the data of a message; None if it is in a chunk that is known to be bad.
 
         Raises
@@ -288,10 +294,7 @@ class _Chunks:
             return self._checked(self._file.record_bytes(entry.block), 0)
         if entry.block in self._bad:
             return None
-        content = self._content(entry.block)
-        if is_last:
-            self._held.forget(entry.block)
-        return self._checked(content, entry.inner)
+        return self._checked(self._content(entry.block), entry.inner)
 
     def _content(self, block: int) -> bytes:
         try:
@@ -327,10 +330,19 @@ def _are_maps(channels: Mapping[int, Channel]) -> bool:
     return all(channel.is_map for channel in channels.values())
 
 
+def _times_ns(entries: Iterable[Entry]) -> dict[int, tuple[int, int]]:
+    """Return the first and last time in each chunk."""
+    times_ns: dict[int, tuple[int, int]] = {}
+    for entry in entries:
+        first_ns, last_ns = times_ns.get(entry.block, (entry.log_time_ns, entry.log_time_ns))
+        times_ns[entry.block] = min(first_ns, entry.log_time_ns), max(last_ns, entry.log_time_ns)
+    return times_ns
+
+
 def _bad_message(entry: Entry, channel: Channel, error: Exception) -> Loss:
     inside = "" if entry.inner == NO_CHUNK else f"at byte {entry.inner} of the chunk "
-    place = f"the message {inside}at byte {entry.block}"
+    place, lapse = f"the message {inside}at byte {entry.block}", lapse_of([entry.log_time_ns])
     if isinstance(error, TooLargeError):
-        return Loss(SkipCause.OVER_MEMORY, place, str(error), 1, channel.topic)
+        return Loss(SkipCause.OVER_MEMORY, place, str(error), 1, channel.topic, lapse=lapse)
     found = " ".join(str(error).split())
-    return Loss(SkipCause.DAMAGED, place, f"it cannot be decompressed ({found})", 1, channel.topic)
+    return Loss(SkipCause.DAMAGED, place, f"it cannot be decompressed ({found})", 1, channel.topic, lapse=lapse)

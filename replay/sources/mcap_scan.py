@@ -13,10 +13,11 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from replay.skip_cause import SkipCause
 from replay.sources.boundary import COPY_AGAIN
+from replay.sources.lapses import AT_END, Place, Written, lapse_of
 from replay.sources.losses import Loss
 from replay.sources.mcap_chunk import (
     BadPart,
@@ -147,6 +148,8 @@ class _Found:
         self._covered, self._others = _Messages(), _Messages()
         self._bad_chunks: list[tuple[int, BadPart, Counter[int] | None]] = []
         self._losses: list[Loss] = []
+        # messages that are left out though they may be right
+        self._doubtful: list[Place] = []
         self._only_covered = False
         # of chunks without a checksum: whether any has indexes; of those that have not all of theirs, where the last
         # record in them begins, and where in the file those end that there are
@@ -179,7 +182,7 @@ class _Found:
             self._bad_chunks.append((record.start, error, indexed_counts(self._file, record.end)))
             return is_followed
         if len(certain) < len(content):
-            self._losses.append(_doubtful_end(record.start))
+            self._doubtful.append((record.start, len(certain)))
         elif inside is not None:
             self._look_for_indexes(record, inside)
         return is_sure
@@ -204,7 +207,7 @@ class _Found:
             header = message_header_at(chunk_content(self._file, block)[0], inner)
             if header is not None:
                 self._others.counts[header.channel] -= 1
-                self._losses.append(_doubtful_end(block))
+                self._doubtful.append((block, inner))
         left = [each for each in self._others.entries if doubtful.get(each.block) != each.inner]
         self._others.entries = left
 
@@ -213,7 +216,8 @@ class _Found:
         length = record.end - record.start
         if length > self._file.most_bytes:
             detail = over_memory(self._file.most_bytes)
-            self._losses.append(Loss(SkipCause.OVER_MEMORY, f"the message at byte {record.start}", detail, 1))
+            loss = Loss(SkipCause.OVER_MEMORY, f"the message at byte {record.start}", detail, 1)
+            self._losses.append(replace(loss, lapse=lapse_of([message.log_time_ns])))
             return
         self._add(message, record.start, NO_CHUNK, self._others)
 
@@ -267,9 +271,10 @@ class _Found:
         table = self._known().completed_by(self._repeated)
         channels = self._channels(table, counts)
         contents = Contents(channels, counts, *self._times_ns())
-        losses = tuple(self._all_losses(walk, contents))
-        bad_chunks = frozenset(start for start, _, _ in self._bad_chunks)
         entries = tuple(self._entries(channels))
+        written = Written(((entry.block, entry.inner), entry.log_time_ns) for entry in entries)
+        losses = tuple(self._all_losses(walk, contents, written))
+        bad_chunks = frozenset(start for start, _, _ in self._bad_chunks)
         return Scan(contents, entries, walk.cut_chunk, losses, bad_chunks, self._only_covered, table)
 
     def _entries(self, channels: Mapping[int, Channel]) -> list[Entry]:
@@ -307,7 +312,7 @@ class _Found:
         times = [times for each in (self._covered, self._others) if (times := each.times_ns)]
         return min((first for first, _ in times), default=None), max((last for _, last in times), default=None)
 
-    def _all_losses(self, walk: Walk, contents: Contents) -> list[Loss]:
+    def _all_losses(self, walk: Walk, contents: Contents, written: Written) -> list[Loss]:
         unknown = list(unknown_types(contents))
         counted_all = self._summary.statistics if self._summary and self._summary.is_checked else None
         found = {key: count for key, count in contents.counts.items() if count}
@@ -316,8 +321,14 @@ class _Found:
         }:
             return unknown
         losses = [*self._losses]
-        losses += [chunk_loss(start, error, lost, contents.channels) for start, error, lost in self._bad_chunks]
-        losses += self._gap_losses(walk, contents, sum(each.messages or 0 for each in losses))
+        for place in self._doubtful:
+            lapse = written.between(place, (place[0] + 1, NO_CHUNK))
+            losses.append(replace(_doubtful_end(place[0]), lapse=lapse))
+        for start, error, lost in self._bad_chunks:
+            # whatever of a chunk that was cut off is there comes before what is not
+            lapse = AT_END if start == walk.cut_chunk else written.between((start, NO_CHUNK), (start + 1, NO_CHUNK))
+            losses.append(replace(chunk_loss(start, error, lost, contents.channels), lapse=lapse))
+        losses += self._gap_losses(walk, contents, written, sum(each.messages or 0 for each in losses))
         if walk.ends_early is not None:
             losses.append(_ends_early(walk.ends_early, self._file))
         if not losses:
@@ -332,7 +343,7 @@ class _Found:
             said = statistics_between(self._file, walk.data_end.end, walk.footer.start)
         return said.channel_message_counts if said else {}
 
-    def _gap_losses(self, walk: Walk, contents: Contents, named: int) -> list[Loss]:
+    def _gap_losses(self, walk: Walk, contents: Contents, written: Written, named: int) -> list[Loss]:
         """Return what is lost in gaps, beside what was named.
 
         The indexes that follow a gap are those of the last chunk in it, and there may have been others: what they count
@@ -343,15 +354,12 @@ class _Found:
         said = self._said_counts(walk)
         short = sum(max(0, count - contents.counts.get(key, 0)) for key, count in said.items())
         is_all = bool(said) and short <= named + sum(total or 0 for total in totals)
-        return [
-            _damaged(
-                gap.start,
-                gap.stop,
-                f"what should be a record there, of type {gap.opcode}, is none that can be read",
-                total if is_all else None,
-            )
-            for gap, total in zip(walk.gaps, totals, strict=True)
-        ]
+        losses = []
+        for gap, total in zip(walk.gaps, totals, strict=True):
+            detail = f"what should be a record there, of type {gap.opcode}, is none that can be read"
+            loss = _damaged(gap.start, gap.stop, detail, total if is_all else None)
+            losses.append(replace(loss, lapse=written.between((gap.start, NO_CHUNK), (gap.stop, NO_CHUNK))))
+        return losses
 
     def _after_the_end(self, walk: Walk) -> list[Loss]:
         """Return what is lost if files were put together end to end."""
@@ -361,7 +369,8 @@ class _Found:
         self._file.file.seek(end)
         if self._file.file.read(len(MAGIC) + 1) != MAGIC + bytes([HEADER]):
             return []
-        return [_damaged(end, self._file.size, "another recording begins there, after the end of this one: split them")]
+        loss = _damaged(end, self._file.size, "another recording begins there, after the end of this one: split them")
+        return [replace(loss, lapse=AT_END)]
 
 
 def _doubtful_end(start: int) -> Loss:
@@ -381,7 +390,7 @@ def _ends_early(end: int, file: RecordFile) -> Loss:
         f"the last whole record ends there, {counted(file.size - end, 'byte')} before the end of the file, and nothing "
         f"closes the recording, as when recording or copying was cut off; {remedy}"
     )
-    return Loss(SkipCause.ENDS_EARLY, f"byte {end}", detail)
+    return Loss(SkipCause.ENDS_EARLY, f"byte {end}", detail, lapse=AT_END)
 
 
 def indexed_counts(file: RecordFile, start: int) -> Counter[int] | None:
@@ -414,6 +423,7 @@ def chunk_loss(start: int, error: BadPart, lost: Counter[int] | None, channels: 
         f"{error.detail}; in it are {named}{more}",
         lost.total(),
         next(iter(topics)) if len(topics) == 1 and lost.keys() <= channels.keys() else "",
+        tuple(topics) if lost.keys() <= channels.keys() else (),
     )
 
 

@@ -14,6 +14,7 @@ from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE, RawMessage, So
 from replay.sources.boundary import COMMON, COPY_AGAIN, TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
 from replay.sources.definitions import differing_field
+from replay.sources.lapses import AT_END, lapse_of
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import MOST_BYTES
 from replay.sources.rosbag1_chunks import Chunk, read_chunk, records_in
@@ -56,7 +57,7 @@ class Rosbag1File(Closing):
         self.path = copy_of or path
         self.losses = Losses()
         self._plain = path
-        self._most_bytes = most_bytes
+        self.most_bytes = most_bytes
         with ExitStack() as stack, translated(self.path, _foreign()):
             file = stack.enter_context(path.open("rb"))
             self._file, header = _begin(self.path, BagFile(file, path.stat().st_size, len(_MAGIC_2_0), 0))
@@ -99,15 +100,22 @@ class Rosbag1File(Closing):
         """Close the file."""
         self._resources.close()
 
-    def chunk(self, contents: Contents, start: int) -> Chunk:
-        """Return what can be used of a chunk; what cannot is named, unless a pass through the file did so."""
+    def chunk(self, contents: Contents, start: int, wanted: Collection[Entry]) -> Chunk:
+        """Return what can be used of a chunk; what cannot is named, unless a pass through the file did so.
+
+        Parameters
+        ----------
+        wanted
+            What the index says to be in it of what is asked for.
+        """
         place = contents.chunks[start]
         with translated(self.path, _foreign(), part=place.name):
-            chunk = read_chunk(self._file.file, place, self._most_bytes)
+            chunk = read_chunk(self._file.file, place, self.most_bytes)
         if chunk.problem is not None and isinstance(contents, Index):
             usable = sum(each is not None and each.op == MESSAGE for each in records_in(chunk.records, place))
             lost = max(0, contents.chunk_counts[start] - usable)
-            self.losses.add(Loss(chunk.problem.cause, place.name, chunk.problem.detail, lost))
+            lapse = lapse_of(each.log_time_ns for each in wanted if not _is_there(chunk.records, each))
+            self.losses.add(Loss(chunk.problem.cause, place.name, chunk.problem.detail, lost, lapse=lapse))
         return chunk
 
     def _read_contents(self, header: Record | None) -> Contents:
@@ -125,12 +133,14 @@ class Rosbag1File(Closing):
 
     def _scanned(self, reason: str, *, is_ended: bool = False) -> Scan:
         """Return what a pass through the file finds, and name why it is made."""
-        scan = Scan(self._file, self.losses, self._most_bytes)
+        scan = Scan(self._file, self.losses, self.most_bytes)
         if is_ended or scan.is_cut:
             # of one that was never whole there is no other copy
             remedy = "" if reason == _UNFINISHED else f"; {COPY_AGAIN}"
             detail = f"the file ends early: {reason}{remedy}"
-            self.losses.add(Loss(SkipCause.ENDS_EARLY, f"byte {self._file.size}", detail, scan.lost_at_end))
+            self.losses.add(
+                Loss(SkipCause.ENDS_EARLY, f"byte {self._file.size}", detail, scan.lost_at_end, lapse=AT_END)
+            )
         else:
             cause = f"{reason}; the file holds not one CR LF, {TEXT_MODE}" if self._lost_line_endings() else reason
             self.losses.add(Loss(SkipCause.DAMAGED, "the index", f"{cause}; messages were found without it", 0))
@@ -184,21 +194,21 @@ class _Reading:
         self._contents = contents
         # what a pass found was seen to be there
         self._is_scanned = isinstance(contents, Scan)
-        self._chunks = ChunkCache(self._load)
         self._problems: set[int] = set()
+        self._unchecked: dict[int, list[Entry]] = {}
         self._checked: set[int] = set()
         self._last: Entry | None = None
 
     def messages(self, entries: list[Entry]) -> Iterator[RawMessage]:
         """Yield the messages that these entries point to."""
-        by_chunk: dict[int, list[Entry]] = {}
         if not self._is_scanned:
             for entry in entries:
-                by_chunk.setdefault(entry.chunk, []).append(entry)
+                self._unchecked.setdefault(entry.chunk, []).append(entry)
+        chunks = ChunkCache(self._load, (entry.chunk for entry in entries), self._bag.most_bytes)
         for entry in entries:
-            chunk = self._chunks[entry.chunk]
-            if by_chunk and entry.chunk not in self._checked:
-                self._check(chunk, by_chunk.pop(entry.chunk))
+            chunk = chunks[entry.chunk]
+            if entry.chunk in self._unchecked:
+                self._check(chunk, self._unchecked.pop(entry.chunk))
             record = _message_at(chunk, entry)
             # Of a chunk without a problem all were checked.
             is_sure = self._is_scanned or entry.chunk not in self._problems
@@ -214,15 +224,14 @@ class _Reading:
         return self._last is not None and entry.chunk in self._checked and entry <= self._last
 
     def _load(self, start: int) -> bytes:
-        chunk = self._bag.chunk(self._contents, start)
+        chunk = self._bag.chunk(self._contents, start, self._unchecked.get(start, ()))
         if chunk.problem is not None:
             self._problems.add(start)
         return chunk.records
 
     def _check(self, chunk: bytes, entries: list[Entry]) -> None:
         for entry in entries:
-            record = _message_at(chunk, entry)
-            if (record is None or not _is_followed(chunk, record)) and entry.chunk not in self._problems:
+            if entry.chunk not in self._problems and not _is_there(chunk, entry):
                 raise _MisfitError(
                     f"the index does not fit the chunk at byte {entry.chunk}: it has a message at byte {entry.inner} "
                     "of it that is not there"
@@ -240,6 +249,11 @@ def _message_at(chunk: bytes, entry: Entry) -> Record | None:
         return None
     is_it = record.number(b"conn") == entry.connection and record.time_ns == entry.log_time_ns
     return record if is_it and record.end <= len(chunk) else None
+
+
+def _is_there(chunk: bytes, entry: Entry) -> bool:
+    record = _message_at(chunk, entry)
+    return record is not None and _is_followed(chunk, record)
 
 
 def _is_followed(chunk: bytes, record: Record) -> bool:

@@ -9,11 +9,12 @@ from __future__ import annotations
 from array import array
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import BinaryIO, NamedTuple, Protocol
 
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
+from replay.sources.lapses import Place, Written
 from replay.sources.losses import Loss, Losses
 from replay.sources.rosbag1_chunks import ChunkPlace, Problem, read_chunk, records_in
 from replay.sources.rosbag1_records import (
@@ -121,6 +122,8 @@ class Scan:
         self._size = file.size
         self._file = file.file
         self._losses = losses
+        # what is lost from one place until before another; when it was recorded is known at the end
+        self._lost: list[tuple[Loss, Place, Place]] = []
         self._most_bytes = most_bytes
         self._bag = file
         self._kept = frozenset(kept)
@@ -137,6 +140,7 @@ class Scan:
         for record in index_section(file.file, file.index_pos if self._has_all_chunks else 0):
             if record.end <= file.size:
                 self._take(record)
+        self._name_losses()
         self._name_missing_chunks()
         self._drop_unknown()
 
@@ -195,7 +199,8 @@ class Scan:
             self._finish_chunk()
             until = "to the end of the file" if following is None else f"up to byte {following}"
             detail = f"there is no record of a bag {until}"
-            self._losses.add(Loss(SkipCause.DAMAGED, f"byte {start}", detail))
+            stop = self._size if following is None else following
+            self._lost.append((Loss(SkipCause.DAMAGED, f"byte {start}", detail), (start, 0), (stop, 0)))
         return following
 
     def _is_unfinished(self, start: int) -> bool:
@@ -235,7 +240,7 @@ class Scan:
         found = self._open = _OpenChunk(place, chunk.problem)
         for each in records_in(chunk.records, place):
             if each is None:
-                found.has_gap = True
+                found.gaps.append(len(found.entries))
             elif each.op == MESSAGE:
                 found.entries.append(Entry(each.time_ns, place.start, each.start, each.number(b"conn")))
             else:
@@ -272,7 +277,7 @@ class Scan:
         found, self._open = self._open, None
         loss = found.finished()
         if loss is not None:
-            self._losses.add(loss)
+            self._lost.append((loss, *found.lost_between()))
         for entry in found.entries:
             self._count(entry)
 
@@ -286,6 +291,13 @@ class Scan:
         # of a connection that is not known yet, it may be
         if topic is None or topic.msgtype in _USED_TYPES or key in self._kept:
             self._found.setdefault(key, array("Q")).extend(entry[:3])
+
+    def _name_losses(self) -> None:
+        rows_of = self._found.values()
+        places = (((rows[at + 1], rows[at + 2]), rows[at]) for rows in rows_of for at in range(0, len(rows), 3))
+        written = Written(places) if self._lost else Written(())
+        for loss, start, stop in self._lost:
+            self._losses.add(replace(loss, lapse=written.between(start, stop)))
 
     def _name_missing_chunks(self) -> None:
         """Name chunks that the index lists and the pass did not meet, unless something else may have been these.
@@ -320,7 +332,8 @@ class _OpenChunk:
     place: ChunkPlace
     problem: Problem | None
     entries: list[Entry] = field(default_factory=list)
-    has_gap: bool = False
+    gaps: list[int] = field(default_factory=list)
+    _contradicted: int = 0
     _indexed: Counter[int] = field(default_factory=Counter)
     _times_ns: dict[tuple[int, int], int] = field(default_factory=dict)
 
@@ -334,7 +347,7 @@ class _OpenChunk:
         """Leave out messages whose time the index contradicts; return what is lost of the chunk."""
         found = len(self.entries)
         self.entries = [each for each in self.entries if not self._is_contradicted(each)]
-        contradicted = found - len(self.entries)
+        contradicted = self._contradicted = found - len(self.entries)
         lost = max(self._indexed.total() - len(self.entries), contradicted)
         if self.problem is not None:
             messages = lost if self._indexed else None
@@ -344,9 +357,21 @@ class _OpenChunk:
             if contradicted:
                 detail = f"its index says another time than {contradicted} of its messages"
             return Loss(SkipCause.DAMAGED, self.place.name, detail, lost)
-        if self.has_gap:
+        if self.gaps:
             return Loss(SkipCause.DAMAGED, self.place.name, "not all of it can be told apart as messages")
         return None
+
+    def lost_between(self) -> tuple[Place, Place]:
+        """Return from where until before where messages of it are lost."""
+        start, stop = (self.place.start, 0), (self.place.start + 1, 0)
+        if self._contradicted or not (self.gaps or self.problem):
+            return start, stop
+        sound = min([*self.gaps, len(self.entries)])
+        if sound:
+            start = self.place.start, self.entries[sound - 1].inner + 1
+        if self.problem is None and self.gaps[-1] < len(self.entries):
+            stop = self.place.start, self.entries[self.gaps[-1]].inner
+        return start, stop
 
     def _is_contradicted(self, entry: Entry) -> bool:
         return self._times_ns.get((entry.connection, entry.inner), entry.log_time_ns) != entry.log_time_ns

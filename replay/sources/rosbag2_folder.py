@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import re
-from collections.abc import Collection, Generator, Iterator, Sequence
+from collections.abc import Collection, Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +16,12 @@ from replay.sources.base import RawMessage, Source, SourceInfo
 from replay.sources.beginnings import nothing_there
 from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.compressed_file import head_of, name_early_end, plain_copy, too_early
+from replay.sources.lapses import AT_END, Lapse, Written
 from replay.sources.losses import Loss, Losses, place_in
 from replay.sources.mcap_file import McapFile
 from replay.sources.mcap_scan import Scan
 from replay.sources.memory import MOST_BYTES
-from replay.sources.rosbag2_metadata import METADATA, listed_parts, name_gaps
+from replay.sources.rosbag2_metadata import METADATA, Parts, listed_parts, numbered_parts
 from replay.sources.sqlite3_file import Sqlite3File
 from replay.sources.topics import topic_table
 from replay.sources.zstd import ZstdError
@@ -54,15 +55,14 @@ class Rosbag2Folder(Closing):
         self.losses = Losses()
         with translated(path, _FOREIGN):
             listed = listed_parts(path, self.losses)
-            parts = listed or _parts_in(path)
-            if not parts:
+            known = listed if listed.paths else numbered_parts(_parts_in(path))
+            if not known.paths:
                 raise InputError(
                     f"{path}: this bag has no file with messages, and its {METADATA} lists none; copy its .db3 or "
                     ".mcap files here"
                 )
-            self._parts = _opened_parts(parts, self.losses, most_bytes)
-            if not listed:
-                name_gaps(parts, self.losses)
+            self._parts = _opened_parts(known, self.losses, most_bytes)
+            if not listed.paths:
                 _check_that_they_belong_together(path, self._parts)
 
     @classmethod
@@ -131,6 +131,9 @@ class _FilePart:
 
     def __init__(self, path: Path, losses: Losses, most_bytes: int) -> None:
         self._path = path
+        self._lapses: list[tuple[str, Lapse]] = []
+        self._all_of_it: Lapse | None = None
+        self._behind_it = AT_END
         self._most_bytes = most_bytes
         self._losses = losses
         self._map_scan: Scan | None = None
@@ -154,6 +157,11 @@ class _FilePart:
             for message in source.messages(topics):
                 self._name_losses(source)
                 yield message
+
+    def place(self, all_of_it: Lapse, behind_it: Lapse) -> None:
+        """Say when it was recorded, all of it and what of it may come behind all that is left of it."""
+        self._all_of_it, self._behind_it = all_of_it, behind_it
+        self._tell_lapses()
 
     def close(self) -> None:
         """Close the file and remove its copies, also those that are still being read."""
@@ -183,7 +191,18 @@ class _FilePart:
 
     def _name_losses(self, source: Source) -> None:
         for loss in source.losses.new():
-            self._losses.add(replace(loss, place=place_in(self.name, loss.place)))
+            # its lapse is told as that of the recording
+            self._losses.add(replace(loss, place=place_in(self.name, loss.place), maybe_of=(), lapse=AT_END))
+        self._lapses += source.losses.new_lapses()
+        self._tell_lapses()
+
+    def _tell_lapses(self) -> None:
+        if self._all_of_it is None:
+            return
+        for topic, lapse in self._lapses:
+            placed = self._behind_it if lapse == AT_END else lapse.within(self._all_of_it)
+            self._losses.add_lapse(topic, placed)
+        self._lapses.clear()
 
     def _source(self, plain: Path, *, is_whole: bool) -> Source:
         head = head_of(plain)
@@ -201,7 +220,7 @@ class _FilePart:
         )
 
 
-def _opened_parts(paths: Sequence[Path], losses: Losses, most_bytes: int) -> list[_FilePart]:
+def _opened_parts(known: Parts, losses: Losses, most_bytes: int) -> list[_FilePart]:
     """Return the parts that can be read, and name the others.
 
     Raises
@@ -209,19 +228,42 @@ def _opened_parts(paths: Sequence[Path], losses: Losses, most_bytes: int) -> lis
     InputError
         If none can be read, with what the first one said.
     """
-    parts, errors = [], []
-    for path in paths:
+    parts: dict[int, _FilePart] = {}
+    errors: list[InputError] = []
+    unread: list[tuple[int, Loss]] = []
+    for index, path in enumerate(known.paths):
         try:
-            parts.append(_FilePart(path, losses, most_bytes))
+            parts[index] = _FilePart(path, losses, most_bytes)
         except InputError as error:
             if isinstance(error.__cause__, OSError):
                 # of the machine, not of the recording
                 raise
             errors.append(error)
-            losses.add(Loss(SkipCause.DAMAGED, path.name, str(error).removeprefix(f"{path}: ")))
+            unread.append((index, Loss(SkipCause.DAMAGED, path.name, str(error).removeprefix(f"{path}: "))))
     if not parts:
         raise errors[0]
-    return parts
+    _place(parts, known.missing, unread, losses)
+    return list(parts.values())
+
+
+def _place(
+    parts: Mapping[int, _FilePart],
+    missing: Sequence[tuple[int, Loss]],
+    unread: Sequence[tuple[int, Loss]],
+    losses: Losses,
+) -> None:
+    """Say of the parts, and of what is lost between them, when it was recorded."""
+    infos = ((index, part.info.start_ns, part.info.stop_ns) for index, part in parts.items())
+    spans = [(index, start, stop) for index, start, stop in infos if start is not None and stop is not None]
+    written = Written(
+        ((index, end), time_ns) for index, start, stop in spans for end, time_ns in enumerate((start, stop))
+    )
+    for index, loss in missing:
+        losses.add(replace(loss, lapse=written.between((index, -1), (index, 0))))
+    for index, loss in unread:
+        losses.add(replace(loss, lapse=written.between((index, 0), (index + 1, 0))))
+    for index, part in parts.items():
+        part.place(written.between((index, 0), (index + 1, 0)), written.between((index, 2), (index + 1, 0)))
 
 
 def _check_that_they_belong_together(path: Path, parts: Sequence[_FilePart]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 from typing import Any
 
@@ -20,12 +21,20 @@ _KEY = "rosbag2_bagfile_information"
 _NUMBERED = re.compile(r"(.*)_(0|[1-9]\d{0,4})((?:\.[a-z0-9]+)+)")
 
 
-def listed_parts(path: Path, losses: Losses) -> list[Path]:
-    """Return the files that the metadata of a bag lists, and name those that are missing, or metadata that lists none.
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """The files of a bag that are there, and of each missing one the loss and how many files come before it."""
+
+    paths: Sequence[Path]
+    missing: Sequence[tuple[int, Loss]] = ()
+
+
+def listed_parts(path: Path, losses: Losses) -> Parts:
+    """Return the files that the metadata of a bag lists, and name metadata that lists none.
 
     Returns
     -------
-    list of Path
+    Parts
         Empty if there is no metadata, or none that lists files: then it says nothing of the recording that its files
         do not say themselves.
 
@@ -55,28 +64,36 @@ def listed_parts(path: Path, losses: Losses) -> list[Path]:
             f"{path}: all {len(names)} parts that {METADATA} lists are missing: {shown}; copy them here as well"
         )
     counts = _message_counts(metadata)
-    for name in missing:
-        detail = f"{METADATA} lists it, and it is not there: copy it here as well"
-        losses.add(Loss(SkipCause.MISSING_PART, name, detail, counts.get(name)))
-    return list(dict.fromkeys(part for part in found.values() if part is not None))
+    detail = f"{METADATA} lists it, and it is not there: copy it here as well"
+    parts: dict[Path, None] = {}
+    lost: list[tuple[int, Loss]] = []
+    for name, part in found.items():
+        if part is None:
+            lost.append((len(parts), Loss(SkipCause.MISSING_PART, name, detail, counts.get(name))))
+        else:
+            parts[part] = None
+    return Parts(list(parts), lost)
 
 
-def name_gaps(parts: Sequence[Path], losses: Losses) -> None:
-    """Name parts that are missing as their numbers tell, where nothing lists them.
+def numbered_parts(paths: Sequence[Path]) -> Parts:
+    """Return these files with those that are missing as their numbers tell, where nothing lists them.
 
     Files with numbers far apart are not numbered as parts.
     """
-    numbers: dict[tuple[str, str], list[int]] = {}
-    for part in parts:
+    numbers: dict[tuple[str, str], dict[int, int]] = {}
+    for index, part in enumerate(paths):
         match = _NUMBERED.fullmatch(part.name)
         if match:
-            numbers.setdefault((match[1], match[3]), []).append(int(match[2]))
+            numbers.setdefault((match[1], match[3]), {})[int(match[2])] = index
+    detail = "parts before and after it are there: copy it here as well"
+    lost: list[tuple[int, Loss]] = []
     for (stem, suffix), present in numbers.items():
         missing = sorted(set(range(min(present), max(present))) - set(present))
         if len(missing) < len(present):
             for number in missing:
-                detail = "parts before and after it are there: copy it here as well"
-                losses.add(Loss(SkipCause.MISSING_PART, f"{stem}_{number}{suffix}", detail))
+                before = 1 + max(index for other, index in present.items() if other < number)
+                lost.append((before, Loss(SkipCause.MISSING_PART, f"{stem}_{number}{suffix}", detail)))
+    return Parts(paths, lost)
 
 
 def _present(path: Path, name: str) -> Path | None:

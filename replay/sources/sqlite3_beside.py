@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from replay.skip_cause import SkipCause
+from replay.sources.lapses import AT_END, Lapse
 from replay.sources.losses import Loss, Losses
 from replay.sources.sqlite3_journal import read_journal
 from replay.sources.sqlite3_log import PageLog
@@ -60,7 +61,9 @@ def plain_file(path: Path, shown: Path, losses: Losses, stack: ExitStack) -> Pla
         name = f"{shown.name}{suffix}"
         log = _READERS[suffix](left, name, losses)
         if log is not None and log.places and not _belongs(plain.path, log):
-            losses.add(Loss(SkipCause.DAMAGED, name, "it does not belong to the file: its pages have another length"))
+            detail = "it does not belong to the file: its pages have another length"
+            lapse = AT_END if suffix == _WAL else Lapse()
+            losses.add(Loss(SkipCause.DAMAGED, name, detail, lapse=lapse))
             log = PageLog(0, 0, is_whole=False)
         if log is not None:
             plain = _with(plain, log, left, stack)

@@ -19,6 +19,7 @@ from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE, RawMessage, SourceInfo
 from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.definitions import differing_field
+from replay.sources.lapses import Lapse, lapse_of
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import MOST_BYTES, TooLargeError
 from replay.sources.sqlite3_beside import beside, plain_file
@@ -192,7 +193,8 @@ class Sqlite3File(Closing):
             detail = f"it cannot be decompressed: {' '.join(str(error).split())}"
         except TooLargeError as error:
             cause, detail = SkipCause.OVER_MEMORY, str(error)
-        self.losses.add(Loss(cause, f"message {row.key}", detail, 1, topic.name))
+        lapse = lapse_of([row.log_time_ns]) if isinstance(row.log_time_ns, int) else Lapse()
+        self.losses.add(Loss(cause, f"message {row.key}", detail, 1, topic.name, lapse=lapse))
         return None
 
     def _check_encodings(self, topics: Iterable[_Topic]) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from replay.skip_cause import SkipCause
+from replay.sources.lapses import AT_END
 from replay.sources.losses import Loss, Losses
 from replay.sources.sqlite3_log import PageLog, is_page_length
 
@@ -71,7 +72,7 @@ def read_journal(path: Path, name: str, losses: Losses) -> PageLog | None:
             losses.add(Loss(error.cause, name, f"{error}: {_UNCLEAR}"))
         if _names_another(file, size):
             detail = "it names another journal, which is not read: the change is undone, finished or not"
-            losses.add(Loss(SkipCause.DAMAGED, name, detail))
+            losses.add(Loss(SkipCause.DAMAGED, name, detail, lapse=AT_END))
     return PageLog(sizes.page_bytes, pages, places, is_whole)
 
 

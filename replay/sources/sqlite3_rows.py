@@ -11,6 +11,7 @@ from typing import BinaryIO, NamedTuple, Protocol
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
 from replay.sources.boundary import COPY_AGAIN
+from replay.sources.lapses import AT_END, LATEST, Lapse, Written
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import TooLargeError
 from replay.sources.sqlite3_places import Places, own_places, told_places
@@ -277,17 +278,21 @@ class SalvagedTables:
         """
         for loss in self._losses:
             losses.add(loss)
-        count = self._found.counts.total()
+        gaps, count = self._leaves.gaps, self._found.counts.total()
+        # keys are counted up as messages are written
+        written = Written(((row.key, 0), row.log_time_ns) for row in self._found.rows)
         if whole is not None:
             detail = f"{whole.detail}; {counted(count, 'message')} could be read; {COPY_AGAIN}"
-            losses.add(replace(whole, detail=detail, messages=_lost(self._leaves, count)))
+            losses.add(replace(whole, detail=detail, messages=_lost(self._leaves, count), lapse=AT_END))
+            for lapse in (*(_gap_lapse(written, gap) for gap in gaps), *(_lapse(written, key) for key in self._bad)):
+                losses.add_lapse("", lapse)
             return
-        for gap in self._leaves.gaps:
-            losses.add(_page_loss(gap, "messages"))
+        for gap in gaps:
+            losses.add(replace(_page_loss(gap, "messages"), lapse=_gap_lapse(written, gap)))
         for key in sorted(self._bad):
             if key > 0:
                 detail = "its pages are missing, another message's, or no message's"
-                losses.add(Loss(SkipCause.DAMAGED, f"message {key}", detail, 1))
+                losses.add(Loss(SkipCause.DAMAGED, f"message {key}", detail, 1, lapse=_lapse(written, key)))
 
     def topics(self) -> list[Record]:
         """Return the rows of ``topics`` that are there."""
@@ -397,6 +402,15 @@ def _used_topic(row: Record) -> int | None:
     """Return the id of a topic whose messages may be asked for: of maps and transforms."""
     key, msgtype = row.get("id"), row.get("type")
     return key if isinstance(key, int) and normalised_type(str(msgtype)) in _USED_TYPES else None
+
+
+def _lapse(written: Written, first: int, last: int | None = None) -> Lapse:
+    """Return the lapse of the messages with these keys."""
+    return written.between((first, 0), ((first if last is None else last) + 1, 0))
+
+
+def _gap_lapse(written: Written, gap: Gap) -> Lapse:
+    return _lapse(written, gap.low + 1, LATEST if gap.high is None else gap.high)
 
 
 def _page_loss(gap: Gap, what: str) -> Loss:

@@ -12,6 +12,7 @@ import numpy as np
 
 from replay.skip_cause import SkipCause
 from replay.sources.boundary import COPY_AGAIN
+from replay.sources.lapses import AT_END
 from replay.sources.losses import Loss, Losses
 from replay.sources.sqlite3_log import PageLog, is_page_length
 
@@ -41,7 +42,8 @@ def read_wal(path: Path, name: str, losses: Losses) -> PageLog | None:
         head = file.read(_HEAD.size)
         order = _order(head)
         if order is None:
-            losses.add(Loss(SkipCause.DAMAGED, name, "it does not begin like a write-ahead log of SQLite"))
+            detail = "it does not begin like a write-ahead log of SQLite"
+            losses.add(Loss(SkipCause.DAMAGED, name, detail, lapse=AT_END))
             return None
         return _read(file, path.stat().st_size, head, order, name, losses)
 
@@ -85,10 +87,10 @@ def _read(file: BinaryIO, size: int, head: bytes, order: str, name: str, losses:
         start += frame_bytes
     is_cut = start < size < start + frame_bytes
     if is_cut:
-        losses.add(Loss(SkipCause.ENDS_EARLY, name, f"the file ends early at byte {size}; {COPY_AGAIN}"))
+        losses.add(Loss(SkipCause.ENDS_EARLY, name, f"the file ends early at byte {size}; {COPY_AGAIN}", lapse=AT_END))
     if used < written:
         detail = f"the checksum of its page {used + 1} is wrong: that one and the {written - used - 1} after it"
-        losses.add(Loss(SkipCause.WRONG_CHECKSUM, name, f"{detail} are not used"))
+        losses.add(Loss(SkipCause.WRONG_CHECKSUM, name, f"{detail} are not used", lapse=AT_END))
     return PageLog(page_bytes, pages, places, is_whole=not is_cut and used == written)
 
 

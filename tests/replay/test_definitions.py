@@ -4,10 +4,12 @@ import sys
 from typing import Literal
 
 import pytest
+from rosbags.typesys import get_types_from_msg
 
 from replay.codec import ros1_typestore, ros2_typestore
 from replay.sources.base import GRID_TYPE, TF_TYPE, UPDATE_TYPE
-from replay.sources.definitions import differing_field
+from replay.sources.definition_text import stated_fields
+from replay.sources.definitions import _type_name, differing_field
 
 LINE = "=" * 80
 
@@ -115,6 +117,60 @@ def test_definitions_in_idl() -> None:
     assert "stamp" in str(differing_field(UPDATE_TYPE, IDL.replace("Time stamp", "Duration stamp"), 2))
 
 
+@pytest.mark.parametrize("ros", [1, 2])
+def test_fields_are_those_that_the_reference_finds(ros: Literal[1, 2]) -> None:
+    store = ros1_typestore() if ros == 1 else ros2_typestore()
+    names = sorted(set(store.fielddefs) - {"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"})
+    assert len(names) > 100
+    for name in names:
+        definition = store.generate_msgdef(name, ros_version=ros)[0]
+        head, *parts = definition.split(LINE + "\n")
+        # of a constant alone, and of two ways to write what is not in the bytes
+        text = LINE.join([f"# {name}\n{head}", *(f"\n{part}" for part in parts)])
+        expected = {key: fields for key, (_, fields) in get_types_from_msg(definition, name).items()}
+        assert stated_fields(name, text) == {
+            key: [(field, _type_name(kind)) for field, kind in fields] for key, fields in expected.items()
+        }
+
+
+ODD_IDL = """\
+#include "x.idl"
+/* module nothing { */ // struct nothing
+module a { module msg {
+  @verbatim (language="comment", text="a ) \\" ; }" "b")
+  module C_Constants { const long X = (1 + (2)); const string S = "};"; };
+  enum Kind { ONE, TWO };
+  typedef double double__9[9];
+  typedef sequence<octet, 4> bytes;
+  struct Inner { long long x, y; };
+  @final struct C {
+    @key @default (value=(3)) unsigned short u;
+    double__9 covariance;
+    bytes data; Inner inner; a::msg::Inner other;
+    sequence<string<3>, C_Constants::X> names; boolean is_on; wstring w; std_msgs::msg::Header header; int8 z[3];
+  };
+}; };
+"""
+
+
+def test_fields_of_idl_are_found_whatever_is_beside_them() -> None:
+    assert stated_fields("a/msg/C", ODD_IDL) == {
+        "a/msg/Inner": [("x", "int64"), ("y", "int64")],
+        "a/msg/C": [
+            ("u", "uint16"),
+            ("covariance", "float64[9]"),
+            ("data", "byte[]"),
+            ("inner", "a/msg/Inner"),
+            ("other", "a/msg/Inner"),
+            ("names", "string[]"),
+            ("is_on", "bool"),
+            ("w", "wstring"),
+            ("header", "std_msgs/msg/Header"),
+            ("z", "int8[3]"),
+        ],
+    }
+
+
 def test_what_idl_allows_and_bytes_do_not_show_does_not_matter() -> None:
     text = IDL.replace(
         "struct OccupancyGridUpdate {",
@@ -139,6 +195,10 @@ def test_what_idl_allows_and_bytes_do_not_show_does_not_matter() -> None:
     assert "is int8[4] in the rec" in str(differing_field(UPDATE_TYPE, array, 2))
 
 
+def module(content: str) -> str:
+    return f"module nav_msgs {{ module msg {{ {content} }}; }};"
+
+
 NESTED = "(" * 100_000
 TEXTS = {
     "parentheses": f"module a {{ const long X = {NESTED}1{NESTED.replace('(', ')')}; }};",
@@ -152,6 +212,17 @@ TEXTS = {
     "separators": "===\n" * 60_000,
     "long names": "module " + "a" * 100_000 + " { struct b { " + "c d;" * 30_000 + "}; };",
     "long title": f"int8 x\n{LINE}\nMSG: {'a' * 100_000}/B\n" + "C d\n" * 30_000,
+    "operators": module(f"const long X = 1{'+1' * 100_000};"),
+    "arguments": module(f"struct A {{ @a({NESTED[:50_000]}{')' * 50_000}) long x; }};"),
+    "nested sequences": module(f"struct A {{ {'sequence<' * 20_000}long{'>' * 20_000} x; }};"),
+    "modules on a line": "module a { " * 20_000 + "struct A { b::C d; };",
+    "typedefs": module("".join(f"typedef a{i} a{i + 1};" for i in range(9000))),
+    "escapes": module(r"const string X = " + r"\"" * 100_000),
+    "newlines of idl": "\n" * 250_000 + "module",
+    "fields": "int8 a\n" * 30_000,
+    "annotations": "@a " * 80_000,
+    "a name": f"int8 {'a' * 250_000};",
+    "a type": f"{'a/' * 120_000}; b",
 }
 
 

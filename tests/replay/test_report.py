@@ -159,6 +159,17 @@ def test_what_is_lost_is_counted_by_place() -> None:
     ]
 
 
+def test_damage_that_costs_nothing_is_listed_and_not_counted() -> None:
+    report = builder()
+    report.skip(Skipped("", "", 5, SkipCause.ENDS_EARLY, "detail", "run.bag", "byte 9", 0))
+    found = report.build(None, Merger(ROBOTS).result, [INPUT])
+    validate(found)
+    assert found["skipped"] == {}
+    assert [(item["cause"], item["place"], item["messages"]) for item in found["skipped_at"]] == [
+        ("ends_early", "byte 9", 0)
+    ]
+
+
 def test_of_very_many_places_the_first_are_listed() -> None:
     report = builder()
     for number in range(500):

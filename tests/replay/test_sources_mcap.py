@@ -2,7 +2,9 @@ from __future__ import annotations
 
 import io
 import struct
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,8 @@ from mcap.records import Message
 from mcap.writer import IndexType, Writer
 
 from replay.sources import mcap_chunk, mcap_file, mcap_scan, open_source
-from replay.sources.chunks import HELD_CHUNKS, ChunkCache
-from replay.sources.mcap_records import MAGIC
+from replay.sources.chunks import FEW_CHUNKS, ChunkCache
+from replay.sources.mcap_records import MAGIC, RecordFile
 from tests import bags
 from tests.bags import NO_INDEX, NO_SUMMARY, SAMPLE, START, in_order
 from tests.replay.test_sources_open import refused
@@ -196,27 +198,62 @@ def test_file_without_messages(tmp_path: Path) -> None:
 # --- memory
 
 
-def test_only_a_few_chunks_are_held() -> None:
+def test_chunks_that_are_needed_in_turn_are_loaded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    loads: Counter[int] = Counter()
+    content = mcap_file.chunk_content
+
+    def counted(file: RecordFile, start: int) -> tuple[bytes, bool]:
+        loads[start] += 1
+        return content(file, start)
+
+    monkeypatch.setattr(mcap_file, "chunk_content", counted)
+    robots, maps = 9, 20
+    one_after_the_other = [
+        replace(bags.recorded_map(f"/r{robot}/map", bags.START, seed=robot), log_time_ns=bags.START + number)
+        for robot in range(robots)
+        for number in range(maps)
+    ]
+    path = bags.write_mcap(tmp_path / "a.mcap", one_after_the_other, chunk_bytes=maps * 2600)
+    with open_source(path) as source:
+        found = [message.topic for message in source.messages([f"/r{robot}/map" for robot in range(robots)])]
+    assert found[:robots] == [f"/r{robot}/map" for robot in range(robots)]
+    assert len(loads) > FEW_CHUNKS
+    assert set(loads.values()) == {1}
+
+
+def cached(uses: Sequence[int], size: int, most_bytes: int) -> tuple[list[int], int]:
+    """Return which chunks are loaded if they are used in this order, and how many are held at most."""
     loads: list[int] = []
+    most = 0
 
     def load(offset: int) -> bytes:
         loads.append(offset)
-        return b"%d" % offset
+        return bytes([offset]) * size
 
-    cache = ChunkCache(load)
-    for offset in (*range(HELD_CHUNKS), *range(HELD_CHUNKS)):
-        assert cache[offset] == b"%d" % offset
-    assert loads == list(range(HELD_CHUNKS))
-    cache[99], cache[1], cache[0]
-    assert loads == [*range(HELD_CHUNKS), 99, 0]
+    cache = ChunkCache(load, uses, most_bytes)
+    for offset in uses:
+        assert cache[offset] == bytes([offset]) * size
+        most = max(most, len(cache))
+    assert len(cache) == 0
+    return loads, most
+
+
+def test_chunks_are_held_as_long_as_they_are_needed_and_are_not_too_large() -> None:
+    rounds = [*range(10)] * 5
+    assert cached(rounds, 100, 10_000) == (list(range(10)), 10)
+    loads, most = cached(rounds, 100, 250)
+    assert most == FEW_CHUNKS
+    # one that lets go of what was used first finds nothing that it needs
+    assert len(loads) < len(rounds) * 3 // 4
+    assert cached([1, 1, 2, 2, 3], 100, 10_000) == ([1, 2, 3], 1)
 
 
 def test_a_chunk_is_let_go_of_once_all_its_messages_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     caches: list[ChunkCache] = []
 
     class Watched(ChunkCache):
-        def __init__(self, load: Callable[[int], bytes]) -> None:
-            super().__init__(load)
+        def __init__(self, load: Callable[[int], bytes], uses: Iterable[int], most_bytes: int) -> None:
+            super().__init__(load, uses, most_bytes)
             caches.append(self)
 
     monkeypatch.setattr("replay.sources.mcap_file.ChunkCache", Watched)

@@ -178,6 +178,14 @@ class TestStamps:
         found, _ = run(transforms(linked(1.0, link("map", "odom")), moved))
         assert sorted(told(found)) == ["1: odom", "bad_time"]
 
+    def test_no_update_belongs_to_the_map_before_one_of_which_nothing_tells_the_time(self) -> None:
+        one, two = (mapped("r1", 10.0 * index, index) for index in range(2))
+        odd = Recorded(two.topic, two.msgtype, 2**64 - 1, {**two.fields, "stamp_ns": 0})
+        part = replace(updated("r1", 20.0, 0, 0, numbered(7).cells), log_time_ns=2**64 - 1)
+        assert told(run(feed(one, part))[0]) == [(0.0, {"r1": 0}), (20.0, {"r1": 7})]
+        found, _ = run(feed(one, odd, part))
+        assert sorted(map(str, told(found))) == ["(0.0, {'r1': 0})", "bad_time", "update_before_grid"]
+
     def test_a_whole_header_is_believed_whatever_the_log_time(self) -> None:
         one, two = (mapped("r1", 10.0 * index, index) for index in range(2))
         found, (tally,) = run(feed(one, Recorded(two.topic, two.msgtype, 2**64 - 1, two.fields)))
