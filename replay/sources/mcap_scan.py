@@ -272,7 +272,9 @@ class _Found:
         channels = self._channels(table, counts)
         contents = Contents(channels, counts, *self._times_ns())
         entries = tuple(self._entries(channels))
-        written = Written(((entry.block, entry.inner), entry.log_time_ns) for entry in entries)
+        # which takes as much memory as the entries
+        needed = entries if self._doubtful or self._bad_chunks or walk.gaps else ()
+        written = Written(((entry.block, entry.inner), entry.log_time_ns) for entry in needed)
         losses = tuple(self._all_losses(walk, contents, written))
         bad_chunks = frozenset(start for start, _, _ in self._bad_chunks)
         return Scan(contents, entries, walk.cut_chunk, losses, bad_chunks, self._only_covered, table)

@@ -280,7 +280,8 @@ class SalvagedTables:
             losses.add(loss)
         gaps, count = self._leaves.gaps, self._found.counts.total()
         # keys are counted up as messages are written
-        written = Written(((row.key, 0), row.log_time_ns) for row in self._found.rows)
+        rows = self._found.rows if gaps or self._bad else []
+        written = Written(((row.key, 0), row.log_time_ns) for row in rows)
         if whole is not None:
             detail = f"{whole.detail}; {counted(count, 'message')} could be read; {COPY_AGAIN}"
             losses.add(replace(whole, detail=detail, messages=_lost(self._leaves, count), lapse=AT_END))
