@@ -98,7 +98,7 @@ class TestNames:
         """Of a channel without its schema, and of one whose name is lost."""
         run = tmp_path / "run.mcap"
         with run.open("wb") as file:
-            writer = Writer(file, use_chunking=False)
+            writer = Writer(file, use_chunking=False, repeat_channels=False, repeat_schemas=False)
             writer.start()
             schema = writer.register_schema("a", "ros2msg", b"")
             channels = [writer.register_channel(topic, "cdr", schema) for topic in ("/a", f"/{name}/map")]

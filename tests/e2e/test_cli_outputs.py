@@ -128,7 +128,7 @@ class TestARunThatFailsAtTheEndLeavesWhatWasThere:
         refuse_to(monkeypatch, "link", lambda *_: not has_links)
         ran = replay("merge", two, "-o", replay.folder / "out.mcap", "--force", "--images", "none")
         assert ran.status == 3
-        assert ran.err.splitlines()[-1].endswith(f"{name}: cannot be written: Operation not permitted")
+        assert f"{name}: cannot be written: Operation not permitted" in ran.err.splitlines()[-1]
         assert contents(replay.folder) == there
 
     @pytest.mark.parametrize("name", ["out.mcap", "out.rrd", "out.json"])
