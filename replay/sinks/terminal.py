@@ -131,8 +131,9 @@ class Narrator:
                 self.say(f"and {number - _SKIPPED_NAMED} more of {cause}: the report lists them under skipped_at")
         skipped, late = sum(report["skipped"].values()), sum(item["late"] for item in report["inputs"])
         if skipped:
-            causes = ", ".join(f"{count} {cause}" for cause, count in report["skipped"].items())
-            self.say(f"{counted(skipped, 'message')} skipped: {causes}")
+            least = {each["cause"] for each in report["skipped_at"] if each["messages"] is None}
+            causes = ", ".join(f"{_least(cause in least)}{count} {cause}" for cause, count in report["skipped"].items())
+            self.say(f"{_least(bool(least))}{counted(skipped, 'message')} skipped: {causes}")
         bad_stamps = sum(item["bad_stamps"] for item in report["inputs"])
         if bad_stamps:
             self.say(
@@ -160,6 +161,10 @@ class Narrator:
 
     def discard(self) -> None:
         """Do nothing."""
+
+
+def _least(is_least: bool) -> str:
+    return "at least " if is_least else ""
 
 
 def _ends_early(skipped: Report) -> bool:

@@ -73,3 +73,9 @@ def test_how_many_losses_are_not_listed(replay: Program, tmp_path: Path) -> None
     assert sum(": undecodable: " in each for each in lines) == 5
     assert "and 4 more of undecodable: the report lists them under skipped_at" in lines
     assert "9 messages skipped: 9 undecodable" in lines
+
+
+def test_a_number_that_cannot_be_told_is_the_least_that_it_may_be(replay: Program, tmp_path: Path) -> None:
+    run = bags.write_rosbag1(tmp_path / "run.bag", two_robots())
+    os.truncate(run, run.stat().st_size // 2)
+    assert "at least 1 message skipped: at least 1 ends_early" in replay.merge(run).err.splitlines()
