@@ -3,31 +3,27 @@
 from __future__ import annotations
 
 import struct
-from contextlib import AbstractContextManager, suppress
 
-from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
-from mcap.writer import CompressionType, Writer
-from zstandard import ZstdError
 
-from replay.sinks.partial_file import PartialFile, output_errors
+from replay.sinks.mcap_output import McapOutput
+from replay.sinks.partial_file import PartialFile
 from replay.sources.mcap_records import MessageHeader
 
-_CHUNK_BYTES = 4 << 20
 _NO_SCHEMA = 0
 
 
-class McapCopy:
+class McapCopy(McapOutput):
     """Writes what it is given in the order in which it is given.
 
     Ids of schemas and channels are given anew: those of a damaged file may stand for two things.
     """
 
+    # numbers of a damaged file may fit no field
+    foreign = (*McapOutput.foreign, struct.error)
+
     def __init__(self, file: PartialFile) -> None:
-        self._file = file
-        with self._errors():
-            self._stream = file.stream()
-        self._writer = Writer(self._stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD)
+        super().__init__(file)
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[tuple[object, ...], int] = {}
         self._schema_of = {_NO_SCHEMA: _NO_SCHEMA}
@@ -82,23 +78,3 @@ class McapCopy:
                 attachment.media_type,
                 attachment.data,
             )
-
-    def finish(self) -> None:
-        """Write the index; the file is whole after this, and on the disk."""
-        with self._errors():
-            self._writer.finish()  # type: ignore[no-untyped-call]
-            self._stream.close()
-        self._file.sync()
-
-    def publish(self) -> None:
-        """Give the file its final name."""
-        self._file.publish()
-
-    def discard(self) -> None:
-        """Remove the file."""
-        with suppress(OSError):  # the disk may be full of what is still to be written
-            self._stream.close()
-        self._file.discard()
-
-    def _errors(self) -> AbstractContextManager[None]:
-        return output_errors(self._file.path, McapError, ZstdError, struct.error)

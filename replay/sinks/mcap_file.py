@@ -9,15 +9,12 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
 from importlib import resources
 from typing import Any, cast
 
 import numpy as np
-from mcap.exceptions import McapError
-from mcap.writer import CompressionType, Writer
-from zstandard import ZstdError
+from mcap.writer import Writer
 
 from mapmerge.grid import UNKNOWN, Grid
 from mapmerge.merger import MergeResult
@@ -34,7 +31,8 @@ from replay.events import Event, Finished, Merged, Report, RobotInput, RobotPict
 from replay.options import OutputOptions
 from replay.plain_text import plain, plain_json
 from replay.plan import MERGED_FRAME
-from replay.sinks.partial_file import PartialFile, output_errors
+from replay.sinks.mcap_output import McapOutput
+from replay.sinks.partial_file import PartialFile
 from replay.sinks.qos import LATCHED, VOLATILE
 from replay.sources.base import GRID_TYPE, TF_TYPE
 
@@ -43,17 +41,17 @@ REPORT_TOPIC = "/merged/report"
 IMAGE_TOPICS = "/merged/images"
 REPORT_SCHEMA = "report.schema.json"
 
-_CHUNK_BYTES = 4 << 20
 _NO_SCHEMA = 0
 _LONGEST_PART = 200
 
 
-class McapSink:
+class McapSink(McapOutput):
     """Writes a run's outcome to an MCAP that mcap, rosbags, Rerun and Foxglove read."""
 
     def __init__(self, file: PartialFile, options: OutputOptions) -> None:
+        super().__init__(file)
         self._options = options
-        self._file = file
+        self._channels = _Channels(self._writer)
         self._robots: tuple[RobotInput, ...] = ()
         self._parts: dict[str, str] = {}
         self._merged: Grid | None = None
@@ -62,9 +60,6 @@ class McapSink:
         self._pending_map: tuple[int, Grid] | None = None
         self._pending_report: tuple[int, Report] | None = None
         self._said: Mapping[str, Any] | None = None
-        with output_errors(file.path):
-            self._stream = file.stream()
-        self._channels = _Channels(Writer(self._stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD))
 
     def take(self, event: Event) -> None:
         """Write what a tick brought."""
@@ -82,26 +77,6 @@ class McapSink:
                 case _:
                     pass
             self._stream.flush()  # chunks that are finished outlive a run that is killed
-
-    def finish(self) -> None:
-        """Write the index and close the file."""
-        with self._errors():
-            self._channels.finish()
-            self._stream.close()
-        self._file.sync()
-
-    def publish(self) -> None:
-        """Give the file its final name."""
-        self._file.publish()
-
-    def discard(self) -> None:
-        """Remove the file."""
-        with suppress(OSError):  # the disk may be full of what is still to be written
-            self._stream.close()
-        self._file.discard()
-
-    def _errors(self) -> AbstractContextManager[None]:
-        return output_errors(self._file.path, McapError, ZstdError)
 
     def _tick(self, event: Merged) -> None:
         self._flush_report()
@@ -184,9 +159,6 @@ class _Channels:
 
     def start(self, library: str) -> None:
         self._writer.start(profile="ros2", library=library)
-
-    def finish(self) -> None:
-        self._writer.finish()  # type: ignore[no-untyped-call]
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         self._writer.add_metadata(name, dict(values))

@@ -401,7 +401,7 @@ def test_tiny_messages_take_no_more_memory_than_their_chunk(
 ) -> None:
     """A list of what is in it would take many times as much."""
     del replay  # which runs in the folder
-    monkeypatch.setattr("replay.sinks.mcap_copy._CHUNK_BYTES", 1 << 14)
+    monkeypatch.setattr("replay.sinks.mcap_output._CHUNK_BYTES", 1 << 14)
     inner = schema(1) + channel(1, "/a") + message(1, b"") * ((2 << 20) // len(message(1, b"")))
     TestWhatASourceReadsIsRecovered.write(tmp_path, chunk(inner))
     tracemalloc.start()
