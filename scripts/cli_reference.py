@@ -8,8 +8,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+from replay.commands import COMMANDS
+
 DOCS = Path(__file__).resolve().parents[1] / "docs" / "cli.md"
-COMMANDS = ((), ("merge",), ("info",), ("recover",))
 HEAD = """\
 # Command line
 
@@ -21,7 +22,7 @@ def reference() -> str:
     """Return the text of the page."""
     environment = {**os.environ, "COLUMNS": "110", "NO_COLOR": "1", "PYTHON_COLORS": "0"}
     parts = [HEAD]
-    for command in COMMANDS:
+    for command in ((), *((name,) for name in COMMANDS)):
         arguments = [sys.executable, "-m", "replay", *command, "--help"]
         run = subprocess.run(arguments, capture_output=True, text=True, check=True, env=environment)
         parts.append(f"## {' '.join(('replay', *command))}\n\n```text\n{run.stdout.rstrip()}\n```\n")
