@@ -12,6 +12,7 @@ from replay.robot_names import file_names, is_costmap_or_mask, names_in, namespa
 from replay.runs import RunPath, TopicChoice
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, SourceInfo
 from replay.sources.losses import Loss, summed_up
+from replay.topics import MAP_TOPIC, REPORT_TOPIC
 
 MOST_UNNAMED = 100
 """Every pair of robots is matched: of more robots than this, somebody must have meant it."""
@@ -93,6 +94,13 @@ def _grid_topics(info: SourceInfo) -> list[str]:
     return sorted(topic.name for topic in info.topics if topic.msgtype == GRID_TYPE)
 
 
+def _robots_topics(info: SourceInfo) -> list[str]:
+    """Return the map topics that may be robots' own: the merged map of an earlier run only where there is no other."""
+    topics = _grid_topics(info)
+    of_a_run = any(topic.name == REPORT_TOPIC for topic in info.topics)
+    return [topic for topic in topics if not (of_a_run and topic == MAP_TOPIC)] or topics
+
+
 def _discovered(
     runs: Sequence[RunPath],
     infos: Sequence[SourceInfo],
@@ -103,7 +111,7 @@ def _discovered(
     found: dict[str, Candidates] = {}
     by_file = file_names(runs)
     for index, (run, info) in enumerate(zip(runs, infos, strict=True)):
-        names = names_in(run, by_file[index], _grid_topics(info), topics)
+        names = names_in(run, by_file[index], _robots_topics(info), topics)
         for topic, robot in names.items():
             if _chosen(robot, topic, topics):
                 candidates = found.setdefault(robot, {})

@@ -35,10 +35,8 @@ from replay.sinks.mcap_output import McapOutput
 from replay.sinks.partial_file import PartialFile
 from replay.sinks.qos import LATCHED, VOLATILE
 from replay.sources.base import GRID_TYPE, TF_TYPE
+from replay.topics import IMAGE_TOPICS, MAP_TOPIC, REPORT_TOPIC
 
-MAP_TOPIC = "/merged/map"
-REPORT_TOPIC = "/merged/report"
-IMAGE_TOPICS = "/merged/images"
 REPORT_SCHEMA = "report.schema.json"
 
 _NO_SCHEMA = 0

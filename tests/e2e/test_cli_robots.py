@@ -203,3 +203,18 @@ def test_map_topics_that_are_left_out_are_said(replay: Program, tmp_path: Path) 
     assert said in replay.merge(run).err
     assert said in replay("info", run).out
     assert replay.merge(run, "--topic", "r1=/map", "--force").statuses.keys() == {"r1", "r2"}
+
+
+def test_the_merged_map_of_an_earlier_run_is_no_robot(replay: Program, two: Path, tmp_path: Path) -> None:
+    first = tmp_path / "first.mcap"
+    assert replay("merge", two, "--copy-maps", "--no-rrd", "-o", first).status == 0
+    again = replay.merge(first)
+    assert again.statuses == {"r1": "reference", "r2": "merged"}
+    assert "not used: /merged/map" in again.err
+
+
+def test_a_merged_map_is_merged_where_it_is_the_only_one(replay: Program, two: Path, tmp_path: Path) -> None:
+    first = tmp_path / "first.mcap"
+    assert replay("merge", two, "--no-rrd", "-o", first).status == 0
+    again = replay.merge(f"floor={first}", two)
+    assert again.statuses == {"floor": "reference", "r1": "merged", "r2": "merged"}
