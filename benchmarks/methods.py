@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 
+import cv2
+
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.match import MATCHERS, load_matcher
@@ -17,6 +19,8 @@ RECIPES: Mapping[str, str] = {
     "orb": "benchmarks.recipes:orb",
     "sift": "benchmarks.recipes:sift",
     "hough": "benchmarks.hough:hough_spectra",
+    "m-explore": "benchmarks.m_explore:orb",
+    **({"m-explore-akaze": "benchmarks.m_explore:akaze"} if hasattr(cv2, "AKAZE") else {}),
 }
 
 
