@@ -19,6 +19,7 @@ __all__ = [
     "RefineConfig",
     "ScaleChoice",
     "SearchConfig",
+    "SlackConfig",
     "VerifyConfig",
     "WatchConfig",
 ]

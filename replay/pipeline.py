@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
@@ -108,7 +108,7 @@ def _noted(report: ReportBuilder, notes: Iterable[Noted]) -> Iterator[Noted]:
         yield note
 
 
-def merge(options: RunOptions) -> Iterator[Event]:
+def merge(options: RunOptions) -> Generator[Event, None, None]:
     """Open a run's inputs, merge them, and yield what happens.
 
     Raises
