@@ -3,11 +3,12 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 TOOLS := .venv-tools
+SITE := .venv-docs
 # Only what requirements/ pins is installed, and only if its hash is right.
 PINNED := install --quiet --require-hashes --requirement
 PROJECT := install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: demo test check format docs bench faults picture lock audit clean
+.PHONY: demo test check format docs site bench faults picture lock audit clean
 
 demo: $(VENV)/.runtime ## set up and merge a sample recording
 	mkdir -p out
@@ -29,6 +30,9 @@ format: $(VENV)/.dev ## format the code and fix what can be fixed
 docs: $(VENV)/.dev ## write docs/cli.md anew from --help
 	$(BIN)/python scripts/cli_reference.py
 
+site: $(SITE)/.installed ## make the site from docs/ and the docstrings, in out/site
+	$(SITE)/bin/sphinx-build -q -W --keep-going -n -c docs -d out/doctrees . out/site
+
 bench: $(VENV)/.dev ## measure placements against known truth
 	$(BIN)/python -m benchmarks.truth
 
@@ -47,7 +51,7 @@ audit: $(TOOLS)/.installed ## ask for known vulnerabilities of what is pinned; O
 	$(TOOLS)/bin/python scripts/audit.py $(if $(OFFLINE_OK),--offline-ok)
 
 clean:
-	rm -rf $(VENV) $(TOOLS) out
+	rm -rf $(VENV) $(TOOLS) $(SITE) out
 
 $(VENV)/.runtime: pyproject.toml requirements/run.txt
 	$(PYTHON) -m venv $(VENV)
@@ -60,6 +64,12 @@ $(VENV)/.dev: pyproject.toml requirements/dev.txt
 	$(BIN)/pip $(PINNED) requirements/dev.txt
 	$(BIN)/pip $(PROJECT)
 	touch $@ $(VENV)/.runtime
+
+$(SITE)/.installed: pyproject.toml requirements/docs.txt
+	$(PYTHON) -m venv $(SITE)
+	$(SITE)/bin/pip $(PINNED) requirements/docs.txt
+	$(SITE)/bin/pip $(PROJECT)
+	touch $@
 
 $(TOOLS)/.installed: requirements/tools.txt
 	$(PYTHON) -m venv $(TOOLS)

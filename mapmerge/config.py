@@ -19,6 +19,7 @@ __all__ = [
     "RefineConfig",
     "ScaleChoice",
     "SearchConfig",
+    "SlackConfig",
     "VerifyConfig",
     "WatchConfig",
 ]
@@ -31,7 +32,15 @@ HIGHEST_CONFIDENCE = 0.9999
 
 @dataclass(frozen=True, slots=True)
 class CellConfig(Settings):
-    """When a cell counts as occupied or free (paper, equation 1)."""
+    """When a cell counts as occupied or free (paper, equation 1).
+
+    Parameters
+    ----------
+    p_occupied
+        Least probability of being occupied at which a cell is a wall.
+    p_free
+        Largest one at which it is free; what lies between is neither.
+    """
 
     p_occupied: float = 0.65
     p_free: float = 0.25
@@ -302,7 +311,7 @@ class MergeConfig(Settings):
     Parameters
     ----------
     method
-        A name of `mapmerge.match.MATCHERS`.
+        How two maps are matched: ``correlation``, ``existing`` or ``paper``; a name of `mapmerge.match.MATCHERS`.
     scale
         Whether the maps' resolutions are believed (``metadata``: placements are rigid) or the ratio of their true
         resolutions is estimated as well (``free``).

@@ -62,7 +62,10 @@ class Grid:
 
     def __post_init__(self, is_own: bool) -> None:
         if self.cells.ndim != 2 or self.cells.dtype != np.int8:
-            raise GridError(f"cells are {self.cells.dtype} of shape {self.cells.shape}; expected int8 [rows, columns]")
+            raise GridError(
+                f"cells are {self.cells.dtype} of shape {self.cells.shape}; expected int8 [rows, columns], such as "
+                "cells.astype(np.int8)"
+            )
         if not (math.isfinite(self.resolution_m) and self.resolution_m > 0.0):
             raise GridError(f"resolution is {self.resolution_m} m; expected a positive number")
         if max(self.cells.shape) > MAX_SIDE_CELLS:
@@ -79,6 +82,10 @@ class Grid:
             cells = self.cells.view() if is_own else self.cells.copy()
             cells.flags.writeable = False
             object.__setattr__(self, "cells", cells)
+
+    def __repr__(self) -> str:
+        """Return its size and place; the cells would fill the screen."""
+        return f"<Grid of {self.cols} × {self.rows} cells of {self.resolution_m:g} m, corner at {self.map_from_grid}>"
 
     def _check_values(self) -> None:
         low, high = self.cells.min(), self.cells.max()

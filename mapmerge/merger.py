@@ -68,6 +68,21 @@ class MergeResult:
     updated: tuple[str, ...]
     changes: tuple[Change, ...]
 
+    @property
+    def poses(self) -> dict[str, Sim2]:
+        """Where the map frame of each robot that is placed lies in the merged frame; the reference's is there, too."""
+        placed = {robot: outcome.merged_from_map for robot, outcome in self.robots.items()}
+        return {robot: pose for robot, pose in placed.items() if pose is not None}
+
+    def __str__(self) -> str:
+        """Return a line for each robot: what became of its map, where it lies, and why."""
+        return "\n".join(f"{robot}: {outcome}" for robot, outcome in self.robots.items())
+
+    def __repr__(self) -> str:
+        """Return the robots and what became of them; the maps would fill the screen."""
+        statuses = ", ".join(f"{robot}: {outcome.status}" for robot, outcome in self.robots.items())
+        return f"<MergeResult {statuses}>"
+
 
 class Merger:
     """Takes in robots' maps as they come, and says what is known then.

@@ -103,6 +103,11 @@ class RobotOutcome:
     shown_pair: Pair | None = None
     confidence: float | None = None
 
+    def __str__(self) -> str:
+        """Return what became of it, where it lies, and why."""
+        at = "" if self.merged_from_map is None else f" at {self.merged_from_map}"
+        return f"{self.status}{at}: {self.reason.message}"
+
 
 def outcomes_of(
     robots: Sequence[str],

@@ -34,7 +34,7 @@ class Prior:
     sigma_x_m: float
     sigma_y_m: float
     sigma_yaw_rad: float
-    origin: str
+    origin: str = "given"
 
     def allows(self, target_from_source: Sim2) -> bool:
         """Tell whether a placement lies within the prior, in all three of its directions."""

@@ -46,6 +46,11 @@ class Sim2:
             raise ValueError(f"scale is {self.scale}; expected a positive number")
         object.__setattr__(self, "yaw_rad", wrap_angle(self.yaw_rad))
 
+    def __str__(self) -> str:
+        """Return it to read: ``x 4.50 m, y -1.20 m, yaw 90.0°``, and its scale if that is not 1."""
+        scale = f", scale {self.scale:.3f}" if self.scale != 1.0 else ""
+        return f"x {self.x_m:.2f} m, y {self.y_m:.2f} m, yaw {math.degrees(self.yaw_rad):.1f}°{scale}"
+
     def __matmul__(self, other: Sim2) -> Sim2:
         """Return the transform that applies ``other`` first, then this one."""
         x_m, y_m = self.apply_point(other.x_m, other.y_m)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from difflib import get_close_matches
 from itertools import groupby
 from typing import NoReturn
@@ -26,6 +26,8 @@ examples:
 `replay COMMAND --help` lists the arguments of a command.
 """
 _HEADING_COLUMNS = 12
+_UNSAID = object()
+"""Stands for what a command line does not say."""
 
 
 class _Help(argparse.RawDescriptionHelpFormatter):
@@ -53,11 +55,39 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: object) -> None:
         """Refuse a value that is none of the choices, in the same words whatever the version of Python."""
         if action.choices is not None and value not in action.choices:
-            choices = [str(each) for each in action.choices]
-            meant = closest(str(value), choices)
-            raise argparse.ArgumentError(
-                action, f"{value!r} is none of {', '.join(choices)}{f'; did you mean {meant[0]}?' if meant else ''}"
-            )
+            raise argparse.ArgumentError(action, none_of(str(value), [str(each) for each in action.choices]))
+
+    @property
+    def takes_settings(self) -> bool:
+        """Whether the command takes a file of settings."""
+        return any(action.dest == "config" for action in self._actions)
+
+    def grouped(self) -> Iterator[tuple[str, argparse.Action]]:
+        """Yield all arguments, each with the heading that it is listed under."""
+        for group in self._action_groups:
+            for action in group._group_actions:  # noqa: SLF001 - nothing else tells it
+                yield str(group.title), action
+
+    def parsed(self, arguments: Sequence[str]) -> argparse.Namespace:
+        """Return what a command line says, and for the rest what a file of settings says that it names, or the default.
+
+        Raises
+        ------
+        UsageError
+            If either cannot be understood.
+        """
+        if not self.takes_settings:
+            return self.parse_args(arguments)
+        unsaid = {action.dest: _unsaid(action) for action in self._actions if action.dest != "help"}
+        said = vars(self.parse_args(arguments, argparse.Namespace(**unsaid)))
+        given = {name: value for name, value in said.items() if value is not _UNSAID and value not in ([], None)}
+        chosen: dict[str, object] = {}
+        if "config" in given or "set" in given:
+            from replay.settings.choice import chosen_by
+
+            chosen = chosen_by(self, given)
+        defaults = {name: self.get_default(name) for name in unsaid}
+        return argparse.Namespace(**{**defaults, **chosen, **given})
 
     def _meant(self, message: str) -> str:
         """Return which flags may have been meant instead of those that there are not."""
@@ -65,6 +95,12 @@ class Parser(argparse.ArgumentParser):
         flags = [flag for action in self._actions for flag in action.option_strings]
         found = [close for flag in unknown for close in closest(flag, flags)]
         return f"; did you mean {' or '.join(dict.fromkeys(found))}?" if found else ""
+
+
+def none_of(value: str, choices: Sequence[str]) -> str:
+    """Return that a value is none of some, and which may have been meant."""
+    meant = closest(value, choices)
+    return f"{value!r} is none of {', '.join(choices)}{f'; did you mean {meant[0]}?' if meant else ''}"
 
 
 def closest(word: str, known: Iterable[str], most: int = 1) -> list[str]:
@@ -85,7 +121,7 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     if given and given[0] in COMMANDS:
-        options = command_parser(given[0]).parse_args(given[1:])
+        options = command_parser(given[0]).parsed(given[1:])
         options.command = given[0]
         return options
     _program().parse_args(given[:1])
@@ -119,6 +155,13 @@ def _listing() -> str:
     for group, rows in groupby(COMMANDS.items(), key=lambda row: row[1].group):
         lines += ["", f"{group}:", *(f"  {name:{_HEADING_COLUMNS}}{row.summary}" for name, row in rows)]
     return "\n".join(lines)
+
+
+def _unsaid(action: argparse.Action) -> object:
+    """Return what an argument has before it is said: what those that add to it can add to."""
+    if isinstance(action.default, list):
+        return []
+    return None if action.nargs == 0 and isinstance(action.default, int) and action.default is not False else _UNSAID
 
 
 def _no_command(given: Sequence[str]) -> str:

@@ -11,6 +11,7 @@ from replay.arguments import parsed
 from replay.commands import load
 from replay.errors import ReplayError
 from replay.exit_status import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED
+from replay.origins import naming_origins
 from replay.plain_text import plain
 from replay.standard_streams import printing, quiet_stderr, say
 
@@ -21,7 +22,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     standard_streams.prepare()
     try:
         options = _parsed(arguments)
-        return load(options.command).run(options)
+        with naming_origins(options):
+            return load(options.command).run(options)
     except ReplayError as error:
         say(f"replay: error: {plain(str(error))}")
         return error.exit_code

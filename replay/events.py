@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from mapmerge.render import Picture
 
 Report = Mapping[str, Any]
+"""A report as JSON values, as ``docs/report.schema.json`` describes it."""
+
 Clock = Literal["header", "log", "none"]
 
 
@@ -147,3 +149,4 @@ class Finished:
 
 
 Event = Started | Skipped | Noted | Merged | Finished
+"""What may happen; a run begins with `Started` and ends with `Finished`."""

@@ -124,6 +124,7 @@ class RunOptions:
     def settings(self) -> Mapping[str, Any]:
         """Return the settings that affect results, as written to reports."""
         return {
+            "robots": list(self.robots) if self.robots is not None else None,
             "clock": self.clock,
             "start": asdict(self.start) if self.start else None,
             "stop": asdict(self.stop) if self.stop else None,
@@ -160,6 +161,10 @@ class OutputOptions:
     every_ns: int = 0
     copy_maps: bool = False
     force: bool = False
+
+    def settings(self, images: ImageChoice) -> Mapping[str, Any]:
+        """Return the settings that decide what an MCAP holds, as written to reports."""
+        return {"images": images, "every_ns": self.every_ns, "copy_maps": self.copy_maps}
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 - any JSON value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
@@ -21,22 +21,29 @@ from replay.events import Event, Finished, Merged, Noted, Skipped, Started, Timi
 from replay.footprint import enough_memory
 from replay.gallery import Gallery
 from replay.no_map import losses_of, none_used
-from replay.options import RunOptions
+from replay.options import OutputOptions, RunOptions
 from replay.plan import Plan, memory_limit, open_plan
 from replay.report import ReportBuilder
 from replay.sinks.base import Sink
 from replay.timeline import Transforms, ticks
 
 
-def events(plan: Plan, options: RunOptions) -> Iterator[Event]:
+def events(plan: Plan, options: RunOptions, written: OutputOptions | None = None) -> Iterator[Event]:
     """Replay what was planned and yield what happens.
+
+    Parameters
+    ----------
+    plan, options
+        What is read, and what was said of that.
+    written
+        What is written of it, to be told in the report.
 
     Raises
     ------
     InputError
         If a recording cannot be read, no map could be used, or there is not enough memory.
     """
-    settings = options.settings()
+    settings = {**options.settings(), "outputs": written.settings(options.images) if written else None}
     report = ReportBuilder(plan.robots, settings, __version__)
     beliefs = Beliefs(plan.map_frames, options.init_poses, plan.recordings_with_transforms())
     feeds = (*plan.feeds, *(plan.transform_feeds or ()))
@@ -101,7 +108,7 @@ def _noted(report: ReportBuilder, notes: Iterable[Noted]) -> Iterator[Noted]:
         yield note
 
 
-def merge(options: RunOptions) -> Iterator[Event]:
+def merge(options: RunOptions) -> Generator[Event, None, None]:
     """Open a run's inputs, merge them, and yield what happens.
 
     Raises

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-LOCKS = ("dev.txt", "tools.txt")  # run.txt is a part of dev.txt
+LOCKS = ("dev.txt", "docs.txt", "tools.txt")  # run.txt is a part of dev.txt
 NONE_KNOWN, SOME_KNOWN, NOT_AUDITED = 0, 1, 3
 
 

@@ -41,6 +41,12 @@ LOCKS = (
         "to run, build and test",
         ("pyproject.toml", "--extra", "dev", "--group", "build", "--constraints", "requirements/run.txt"),
     ),
+    # The pages of the API are made from the code as it is run.
+    Lock(
+        "docs.txt",
+        "to make the site",
+        ("pyproject.toml", "--extra", "docs", "--group", "build", "--constraints", "requirements/run.txt"),
+    ),
     Lock("tools.txt", "to write and audit these files", ("--group", "tools")),
 )
 

@@ -55,6 +55,7 @@ COMMANDS: dict[str, Command] = {
     "recover": Command(
         "replay.commands.recover", "main job", "make a readable MCAP of one that was cut off, such as OUT.mcap.partial"
     ),
+    "config": Command("replay.commands.config", "about replay", "print the settings that a run would have, as a file"),
 }
 """In the order in which they are listed."""
 

@@ -27,7 +27,7 @@ read at all; 3 the list could not be written, or a bug; 130 interrupted
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add recordings, and the flags of what is read of them."""
     inputs.add(parser)
-    parser.add_argument(
+    parser.add_argument_group("rules").add_argument(
         "--max-memory",
         metavar="SIZE",
         help="leave out what of a recording is larger to read at once, such as 500MB (default: 1 GiB)",

@@ -38,10 +38,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     inputs.add(parser)
     placing.add(parser)
     outputs.add(parser)
-    strictness = rules.add(parser)
-    strictness.add_argument(
-        "--require-all", action="store_true", help="exit with 1 unless two robots or more were merged, all"
-    )
+    rules.add_all(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -68,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
             refuse_outputs(written, plan.files())
             narrator.unused_topics = plan.unused_topics()
             with open_sinks(written, (ProgressSink(notes), narrator), say=narrator.say) as sinks:
-                report = drain(events(plan, run), sinks, run.jobs).report
+                report = drain(events(plan, run, written), sinks, run.jobs).report
         status = EXIT_DIFFERS if options.require_all and not _all_merged(report) else EXIT_DONE
         _tell(report, written, narrator, as_json=options.json)
     except KeyboardInterrupt:

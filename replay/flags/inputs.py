@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from replay.errors import UsageError
@@ -13,15 +14,17 @@ if TYPE_CHECKING:
     from replay.options import RunOptions
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    """Add recordings, and the flags of what is read of them."""
+def add(parser: argparse.ArgumentParser, *config_names: str) -> None:
+    """Add recordings, the flags of what is read of them, and files of settings, which all commands that do so take."""
     parser.add_argument(
         "runs",
-        nargs="+",
+        nargs="*",
+        default=[],
         metavar="RUN",
         help="a recording, as PATH or ROBOT=PATH: .bag, ROS 2 bag folder, .db3, .mcap, any of these "
         "files compressed with zstd, or a saved map's .yaml",
     )
+    add_settings(parser, *config_names)
     group = parser.add_argument_group("which maps")
     group.add_argument(
         "--robots", metavar="R1,R2,…", help="robots to merge, the reference first (default: all, by name)"
@@ -60,8 +63,35 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run_options(options: argparse.Namespace) -> RunOptions:
-    """Return what is to be read and how it is to be merged; of flags that a command lacks, the defaults."""
+def add_settings(parser: argparse.ArgumentParser, *names: str) -> None:
+    """Add the flags that say settings, the file by these other names, too."""
+    parser.add_argument(
+        "--config",
+        *names,
+        metavar="FILE",
+        type=Path,
+        help="take settings from this file: TOML, as `replay config` prints it, or a run's .json or .mcap; flags win",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="set one of them, also those without a flag, such as merge.verify.min_overlap_m2=4; may be repeated",
+    )
+
+
+def run_options(options: argparse.Namespace, *, needs_runs: bool = True) -> RunOptions:
+    """Return what is to be read and how it is to be merged; of flags that a command lacks, the defaults.
+
+    Raises
+    ------
+    UsageError
+        If something of that cannot be understood, or no recording is given.
+    """
+    if needs_runs and not options.runs:
+        example = f"replay {options.command} run.mcap"
+        raise UsageError(f"RUN is missing; expected one recording or more, PATH or ROBOT=PATH, such as `{example}`")
     from replay.footprint import size_to_bytes
     from replay.options import RunOptions, TimeBound, seconds_to_ns
     from replay.runs import RunPath, TopicChoice

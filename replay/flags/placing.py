@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import argparse
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from replay.errors import UsageError
+
+if TYPE_CHECKING:
+    from mapmerge.config import MergeConfig
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -50,23 +53,36 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def placing_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return how maps are placed, as keywords of `RunOptions`."""
-    from mapmerge.config import MergeConfig, VerifyConfig
-    from mapmerge.errors import ConfigError
     from mapmerge.match import MATCHERS
     from replay.init_pose import InitPose
 
     if options.method not in MATCHERS:
         raise UsageError(f"--method {options.method}: there is no such method; expected {', '.join(MATCHERS)}")
-    verify = VerifyConfig(min_confidence=_probability(options.min_confidence))
-    try:
-        merge = MergeConfig(method=options.method, scale=options.scale, verify=verify)
-    except ConfigError as error:
-        raise UsageError(f"--min-confidence {options.min_confidence}: {error}") from error
     return {
         "init_poses": tuple(InitPose.parse(text) for text in options.init_pose),
         "use_tf": options.use_tf,
-        "merge": merge,
+        "merge": _merge_config(options),
     }
+
+
+def _merge_config(options: argparse.Namespace) -> MergeConfig:
+    """Return the settings of the merger: those that are flags, and those that were said by their names."""
+    from replay.settings import fields
+
+    others: dict[str, tuple[Any, str]] = getattr(options, "merge_fields", {})
+    flags = {
+        "merge.method": options.method,
+        "merge.scale": options.scale,
+        "merge.verify.min_confidence": _probability(options.min_confidence),
+    }
+    try:
+        return fields.put_together({**{key: value for key, (value, _) in others.items()}, **flags})
+    except UsageError as error:
+        section, _, what = str(error).partition(": ")
+        if what.startswith("min_confidence"):
+            raise UsageError(f"--min-confidence {options.min_confidence}: {what}") from error
+        origins = {key.rpartition(".")[0]: origin.rpartition(".")[0] for key, (_, origin) in others.items()}
+        raise UsageError(f"{origins.get(section, section)}: {what}") from error
 
 
 def _probability(text: str) -> float:

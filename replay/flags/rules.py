@@ -34,6 +34,13 @@ def add(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
     return rules
 
 
+def add_all(parser: argparse.ArgumentParser) -> None:
+    """Add these flags, and that of a run which must merge all."""
+    add(parser).add_argument(
+        "--require-all", action="store_true", help="exit with 1 unless two robots or more were merged, all"
+    )
+
+
 def jobs(text: str | None) -> int:
     """Return how many threads are to work at once; those that there are processors for, if nothing is said."""
     if text is None:

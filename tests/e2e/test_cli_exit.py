@@ -75,8 +75,8 @@ def test_require_all_counts_a_robot_without_a_map(replay: Program, tmp_path: Pat
     ("arguments", "expected"),
     [
         ((), "a command is missing; expected one of merge, info"),
-        (("merge",), "RUN; `replay merge --help` lists"),
-        (("info",), "RUN; `replay info --help` lists"),
+        (("merge",), "RUN is missing; expected one recording or more"),
+        (("info",), "such as `replay info run.mcap`"),
         (("fly", "run.mcap"), "fly: there is no such command; expected one of merge, info"),
         (("merg", "run.mcap"), "merg: there is no such command; did you mean merge?"),
         (("run.mcap",), "to merge: replay merge run.mcap"),

@@ -69,7 +69,12 @@ def test_command_line_reference() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "docs/output-formats.md", "docs/benchmarks.md"]
+    "name",
+    [
+        *("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"),
+        *("docs/output-formats.md", "docs/benchmarks.md", "docs/configuration.md"),
+        *("docs/python.md", "docs/index.md", "examples/README.md"),
+    ],
 )
 def test_links_lead_somewhere(name: str) -> None:
     document = ROOT / name

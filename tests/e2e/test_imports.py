@@ -58,6 +58,11 @@ def test_all_that_mapmerge_offers_is_there() -> None:
         _ = mapmerge.nothing
 
 
+@pytest.mark.parametrize("package", ["replay", "mapmerge"])
+def test_packages_are_light(package: str) -> None:
+    assert not loaded(f"import {package}") & HEAVY
+
+
 def test_mapmerge_stands_alone() -> None:
     assert not loaded("import mapmerge") & {"replay", "rosbags", "mcap", "rerun", "rich"}
 

@@ -18,11 +18,12 @@ from packaging.version import Version
 
 from tests.data_paths import ROOT
 
-LOCKS = ("run.txt", "dev.txt", "tools.txt")
+LOCKS = ("run.txt", "dev.txt", "docs.txt", "tools.txt")
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 ASKED: dict[str, list[str]] = {
     "run.txt": [*PROJECT["project"]["dependencies"], *PROJECT["build-system"]["requires"]],
     "dev.txt": [*PROJECT["project"]["dependencies"], *PROJECT["project"]["optional-dependencies"]["dev"]],
+    "docs.txt": [*PROJECT["project"]["dependencies"], *PROJECT["project"]["optional-dependencies"]["docs"]],
     "tools.txt": PROJECT["dependency-groups"]["tools"],
 }
 PLACES = [
@@ -93,6 +94,7 @@ def test_a_lock_names_no_place_on_the_network(lock: str) -> None:
 def test_what_is_tested_is_what_is_run() -> None:
     for place in PLACES:
         assert pinned("run.txt", place).items() <= pinned("dev.txt", place).items()
+        assert pinned("run.txt", place).items() <= pinned("docs.txt", place).items()
 
 
 def test_only_pinned_packages_are_installed() -> None:

@@ -1,0 +1,186 @@
+"""`replay.merge`: a run from Python is that of the command line, told by values."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from datetime import UTC, datetime, timedelta, timezone
+from pathlib import Path
+
+import pytest
+
+import replay
+from mapmerge import MergeConfig, VerifyConfig
+from replay.options import RunOptions, TimeBound
+from replay.runs import RunPath, TopicChoice
+from replay.settings import keys
+from tests.data_paths import ROOT
+from tests.program import Program
+
+SAMPLE = ROOT / "samples" / "two_robots.mcap"
+BAGS = ROOT / "samples" / "bag_per_robot"
+
+
+def options(**told: object) -> RunOptions:
+    return replay.merge("run.mcap", **told).options  # type: ignore[arg-type]
+
+
+def test_a_run_yields_what_happens() -> None:
+    seen = list(replay.merge(SAMPLE, robots=["r2", "r1"], stop=100))
+    assert isinstance(seen[0], replay.Started)
+    assert isinstance(seen[-1], replay.Finished)
+    assert {type(event) for event in seen[1:-1]} == {replay.Merged}
+    assert [item.robot for item in seen[0].robots] == ["r2", "r1"]
+    assert seen[-1].report["settings"]["robots"] == ["r2", "r1"]
+
+
+def test_what_is_written_is_what_the_command_line_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    by_flags = Program(capsys, tmp_path)(
+        "merge", SAMPLE, "-o", tmp_path / "a.mcap", "--no-rrd", "--start", "3.5", "--copy-maps"
+    )
+    assert by_flags.status == 0, by_flags.err
+    run = replay.merge(SAMPLE, start=3.5)
+    report = run.write(tmp_path / "b.mcap", rrd=False, copy_maps=True)
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+    assert replay.read_report(tmp_path / "b.json") == json.loads(json.dumps(report))
+    assert replay.read_report(tmp_path / "b.mcap") == replay.read_report(str(tmp_path / "b.json"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "a.mcap", "b.json", "b.mcap"]
+
+
+def test_the_recording_for_rerun_is_written_too(tmp_path: Path) -> None:
+    replay.merge(SAMPLE, stop=20, images="none").write(tmp_path / "b.mcap")
+    assert (tmp_path / "b.rrd").stat().st_size > 1000
+
+
+def test_a_run_is_over_once() -> None:
+    run = replay.merge(SAMPLE, stop=20)
+    assert run.finish()["updates"] > 0
+    assert list(run) == []
+    with pytest.raises(replay.UsageError, match="this run is over"):
+        run.finish()
+
+
+def test_only_what_was_not_begun_can_be_written(tmp_path: Path) -> None:
+    with replay.merge(SAMPLE, stop=20) as run:
+        next(run)
+        with pytest.raises(replay.UsageError, match="taken already"):
+            run.write(tmp_path / "b.mcap")
+    assert list(run) == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_files_that_exist_are_kept(tmp_path: Path) -> None:
+    output = tmp_path / "b.mcap"
+    output.write_text("mine", encoding="utf-8")
+    with pytest.raises(replay.UsageError, match="already"):
+        replay.merge(SAMPLE).write(output, rrd=False)
+    with pytest.raises(replay.UsageError, match=r"ends in \.mcap"):
+        replay.merge(SAMPLE).write(tmp_path / "b.bag")
+    assert output.read_text(encoding="utf-8") == "mine"
+    replay.merge(SAMPLE, stop=20).write(output, rrd=False, force=True)
+    assert output.stat().st_size > 1000
+
+
+def test_recordings_may_be_one_or_several_or_by_robot() -> None:
+    assert replay.merge(Path("a=b.mcap")).options.runs == (RunPath(None, Path("a=b.mcap")),)
+    assert [run.path.name for run in replay.merge(["a", Path("b")]).options.runs] == ["a", "b"]
+    by_robot = replay.merge({"x": BAGS / "alpha", "y": BAGS / "bravo"}).finish()
+    assert sorted(by_robot["robots"]) == ["x", "y"]
+
+
+def test_values_are_those_of_python() -> None:
+    told = options(
+        robots=["a", "b"],
+        topics={"a": "/x", "b": "/y"},
+        start=12,
+        stop=datetime(1970, 1, 1, 2, tzinfo=timezone(timedelta(hours=1))),
+        reorder_window_s=0.1,
+        init_poses={"b": (1, 2.5, 0.5)},
+        min_confidence=0.99,
+        method="paper",
+        scale="free",
+        max_memory="2GiB",
+    )
+    assert told.robots == ("a", "b")
+    assert told.topics == (TopicChoice("a", "/x"), TopicChoice("b", "/y"))
+    assert told.start == TimeBound(12 * 10**9, relative=True)
+    assert told.stop == TimeBound(3600 * 10**9, relative=False)
+    assert told.reorder_window_ns == 100_000_000
+    assert told.init_poses == (replay.InitPose("b", 1.0, 2.5, 0.5),)
+    assert told.merge == MergeConfig(method="paper", scale="free", verify=VerifyConfig(min_confidence=0.99))
+    assert told.max_memory_bytes == 2 << 30
+
+
+def test_what_is_not_said_is_as_on_the_command_line() -> None:
+    assert options() == RunOptions((RunPath(None, Path("run.mcap")),), images="none")
+    assert options(topics="/{robot}/slam").topics == (TopicChoice(None, "/{robot}/slam"),)
+    assert options(start="60", stop=datetime(2026, 1, 1, tzinfo=UTC)).start == TimeBound(60 * 10**9, relative=True)
+    config = MergeConfig(verify=VerifyConfig(min_overlap_m2=3.0))
+    kept = options(config=config, min_confidence=0.5).merge.verify
+    assert (kept.min_overlap_m2, kept.min_confidence) == (3.0, 0.5)
+
+
+def test_keywords_are_called_as_settings() -> None:
+    keywords = set(inspect.signature(replay.merge).parameters) | set(
+        inspect.signature(replay.MergeRun.write).parameters
+    )
+    names = {key.rpartition(".")[2] for key in keys.all_settings()}
+    of_python_alone = {"config", "self", "rrd", "force"}
+    assert keywords - names == of_python_alone
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ({"robots": "r1,r2"}, "robots is 'r1,r2'; expected a list of names"),
+        ({"robots": ["a", "a"]}, "each once"),
+        ({"clock": "sun"}, "clock is 'sun'; expected one of header, log"),
+        ({"images": "some"}, "images is 'some'"),
+        ({"method": "guess"}, "method is 'guess'; expected one of correlation"),
+        ({"start": -1.0}, "no number of seconds"),
+        ({"start": float("nan")}, "no number of seconds"),
+        ({"stop": "noon"}, "is no time"),
+        ({"init_poses": {"r2": (1, 2)}}, "init_poses of r2 has 2 numbers; expected x_m, y_m and yaw_rad"),
+        ({"min_confidence": 2.0}, "min_confidence is 2.0"),
+        ({"max_memory": "much"}, "no size"),
+    ],
+)
+def test_what_does_not_fit_is_refused_at_once(told: dict[str, object], said: str) -> None:
+    with pytest.raises(replay.ReplayError, match=said):
+        options(**told)
+
+
+def test_without_a_recording_there_is_no_run() -> None:
+    for runs in ([], {}):
+        with pytest.raises(replay.UsageError, match="no recording was given"):
+            replay.merge(runs)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [(None, "there is no such file"), (b"{", "is no JSON"), (b"\xff", "is no JSON"), (b"[]", "is no report of a run")],
+)
+def test_reports_that_are_none(tmp_path: Path, content: bytes | None, said: str) -> None:
+    path = tmp_path / "x.json"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(replay.InputError, match=said):
+        replay.read_report(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"), [(b"", "cannot be read as an MCAP"), (b"x" * 999, "cannot be read as an MCAP")]
+)
+def test_files_that_are_no_mcap_hold_no_report(tmp_path: Path, content: bytes, said: str) -> None:
+    path = tmp_path / "x.mcap"
+    path.write_bytes(content)
+    with pytest.raises(replay.InputError, match=said):
+        replay.read_report(path)
+
+
+def test_all_that_is_offered_is_there() -> None:
+    assert [getattr(replay, name).__name__ for name in replay.__all__] == replay.__all__
+    assert set(replay.__all__) <= set(dir(replay))
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = replay.nothing

@@ -1,0 +1,173 @@
+"""Settings of files: which there are, what they are called, and what is said of each."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import fields, is_dataclass
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mapmerge.config import MergeConfig
+from replay.arguments import command_parser
+from replay.commands import COMMANDS
+from replay.errors import UsageError
+from replay.init_pose import InitPose
+from replay.options import OutputOptions, RunOptions, TimeBound
+from replay.runs import RunPath, TopicChoice
+from replay.settings import fields as merge_fields
+from replay.settings import keys
+from replay.settings.documents import read_assignment, read_settings
+from replay.settings.of_run import document_of
+
+TAKING = [name for name in COMMANDS if command_parser(name).takes_settings]
+ALL = keys.known_keys(keys.all_settings())
+
+
+def field_names(config: Any, prefix: str = "merge") -> list[str]:
+    names = []
+    for item in fields(config):
+        value = getattr(config, item.name)
+        key = f"{prefix}.{item.name}"
+        names += field_names(value, key) if is_dataclass(value) else [key]
+    return names
+
+
+def test_merge_takes_settings() -> None:
+    assert {"merge", "config", "info"} <= set(TAKING)
+
+
+@pytest.mark.parametrize("command", TAKING)
+def test_each_flag_is_a_setting_or_of_one_call(command: str) -> None:
+    """A flag in a group that is not known here would silently be none."""
+    parser = command_parser(command)
+    settings = {action.dest for action in keys.settings_of(parser).values()}
+    for title, action in parser.grouped():
+        assert (action.dest in settings) is not (action.dest in keys.OF_ONE_CALL), (title, action.dest)
+
+
+def test_each_flag_of_merge_is_in_the_list() -> None:
+    flags = {action.dest for action in keys.settings_of(command_parser("merge")).values()}
+    config = {action.dest for action in keys.settings_of(command_parser("config")).values()}
+    assert flags == config
+
+
+def test_each_field_of_the_merger_is_a_setting() -> None:
+    assert list(merge_fields.leaves()) == field_names(MergeConfig())
+    assert set(field_names(MergeConfig())) <= set(ALL)
+
+
+def test_each_field_is_told_of() -> None:
+    assert [key for key in merge_fields.leaves() if not merge_fields.words().get(key)] == []
+
+
+def test_flags_that_are_fields_are_found_there_alone() -> None:
+    names = [key for key in ALL if key.rpartition(".")[2] in ("method", "scale", "min_confidence")]
+    assert sorted(names) == sorted(keys.ELSEWHERE.values())
+
+
+@pytest.mark.parametrize("key", list(merge_fields.leaves()))
+def test_each_field_takes_its_default_from_a_file(key: str) -> None:
+    default = dict(merge_fields.values_of(MergeConfig()))[key]
+    value = json.loads(json.dumps(default), parse_float=Decimal)  # tuples as lists, as TOML has them
+    assert merge_fields.read(key, value, "x") == default
+    assert merge_fields.put_together({key: default}) == MergeConfig()
+
+
+@pytest.mark.parametrize("key", list(merge_fields.leaves()))
+def test_each_field_refuses_what_is_not_of_its_type(key: str) -> None:
+    with pytest.raises(UsageError, match=r"x is \{?a section; expected"):
+        merge_fields.read(key, {}, "x")
+
+
+def test_fields_keep_the_defaults_of_the_settings_that_they_are_in() -> None:
+    """The other method draws with another distance than the paper's."""
+    config = merge_fields.put_together({"merge.existing.ransac.draws": 7})
+    assert (config.existing.ransac.draws, config.existing.ransac.inlier_m) == (7, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("key", "meant"),
+    [
+        ("robot", "robots"),
+        ("topic", "topics"),
+        ("tiem", "time"),
+        ("reorder_window_s", "time.reorder_window_s"),
+        ("time.reorder-window", "time.reorder_window_s"),
+        ("placing.min_confidence", "merge.verify.min_confidence"),
+        ("merge.verify.min_overlap", "merge.verify.min_overlap_m2"),
+        ("merge.existing.max_feature", "merge.existing.max_features"),
+        ("init_pose", "placing.init_poses"),
+    ],
+)
+def test_what_may_have_been_meant(key: str, meant: str) -> None:
+    with pytest.raises(UsageError, match=f"there is no such setting; did you mean {meant}\\?"):
+        keys.refuse_unknown(key, ALL, key)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("time.start=60", 60),
+        ("time.start = 2.5", Decimal("2.5")),
+        ("time.start=12ns", "12ns"),
+        ("merge.method=paper", "paper"),
+        ('merge.method="paper"', "paper"),
+        ("rules.strict=false", False),
+        ("merge.refine.reject_m=[0.5, 1]", [Decimal("0.5"), 1]),
+        ("outputs.output=a=b.mcap", "a=b.mcap"),
+        ("robots=a\nb = 1", "a\nb = 1"),
+        ("robots=1\nb = 1", "1\nb = 1"),
+    ],
+)
+def test_assignments(text: str, value: object) -> None:
+    (said,) = read_assignment(text, ALL).values()
+    assert said.value == value
+
+
+def test_the_settings_of_a_run_are_those_of_a_file(tmp_path: Path) -> None:
+    options = RunOptions(
+        (RunPath(None, Path("run.mcap")),),
+        robots=("a", "b"),
+        topics=(TopicChoice("a", "/x"), TopicChoice(None, "/{robot}/map")),
+        start=TimeBound(1, relative=True),
+        stop=TimeBound(1_700_000_000_123_456_789, relative=False),
+        reorder_window_ns=250_000_001,
+        init_poses=(InitPose("b", 1e-7, -2.0, 0.1 + 0.2),),
+        use_tf=True,
+        max_memory_bytes=1 << 30,
+    )
+    written = OutputOptions(tmp_path / "x.mcap", every_ns=5, copy_maps=True)
+    settings = {**options.settings(), "outputs": written.settings("all")}
+    document = document_of(json.loads(json.dumps(settings)))
+    assert document["robots"] == ["a", "b"]
+    assert document["topics"] == ["a=/x", "/{robot}/map"]
+    assert document["time"]["start"] == Decimal("1e-9")
+    assert document["time"]["stop"] == "1700000000123456789ns"
+    assert document["time"]["reorder_window_s"] == Decimal("0.250000001")
+    assert [InitPose.parse(text) for text in document["placing"]["init_poses"]] == list(options.init_poses)
+    assert document["outputs"] == {"images": "all", "every_s": Decimal("5e-9"), "copy_maps": True}
+    assert document["rules"] == {"max_memory": 1 << 30}
+    assert sorted(document["merge"]) == sorted(item.name for item in fields(MergeConfig))
+
+
+def test_reports_of_runs_that_were_not_written_have_settings_too(tmp_path: Path) -> None:
+    settings = {**RunOptions(()).settings(), "outputs": None}
+    assert document_of(settings)["outputs"] == {}
+    path = tmp_path / "out.json"
+    path.write_text(json.dumps({"schema": "replay.report/1", "settings": {}}), encoding="utf-8")
+    with pytest.raises(UsageError, match="not those that a run writes"):
+        read_settings(path, ALL)
+
+
+def test_what_adds_to_lists_is_named_for_several() -> None:
+    parser = command_parser("merge")
+    appending = {
+        key.rpartition(".")[2]
+        for key, action in keys.settings_of(parser).items()
+        if isinstance(action, argparse._AppendAction)
+    }
+    assert appending == {"topics", "init_poses"}
