@@ -55,6 +55,7 @@ COMMANDS: dict[str, Command] = {
     "recover": Command(
         "replay.commands.recover", "main job", "make a readable MCAP of one that was cut off, such as OUT.mcap.partial"
     ),
+    "compare": Command("replay.commands.compare", "in CI", "list what differs between two runs"),
 }
 """In the order in which they are listed."""
 
