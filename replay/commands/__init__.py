@@ -58,6 +58,7 @@ COMMANDS: dict[str, Command] = {
     "export": Command(
         "replay.commands.export", "after a run", "write maps as map_server loads them, pictures, or transforms"
     ),
+    "evaluate": Command("replay.commands.evaluate", "after a run", "hold a run against known truth"),
     "check": Command("replay.commands.check", "in CI", "merge, and hold the outcome against what is expected"),
     "compare": Command("replay.commands.compare", "in CI", "list what differs between two runs"),
 }
