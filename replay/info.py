@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from replay.codec import decode
+from replay.columns import columns
 from replay.errors import BadMessage, ReplayError
 from replay.messages import GridMessage
 from replay.options import RunOptions
@@ -156,7 +157,7 @@ def lines(summary: RunSummary) -> Iterator[str]:
     for item in summary.inputs:
         duration = f"{item.duration_s:.1f} s" if item.duration_s is not None else "no clock"
         yield f"{item.path}: {item.format}, {duration}, {counted(item.messages, 'message')}"
-        yield from _columns([_row(topic) for topic in item.topics])
+        yield from columns([_row(topic) for topic in item.topics])
         yield from (f"  {lost(loss.messages)} ({loss.place}): {loss.cause}: {loss.detail}" for loss in item.losses)
     if summary.problem is not None:
         yield f"nothing would be merged: {summary.problem}"
@@ -191,9 +192,3 @@ def _row(topic: TopicSummary) -> tuple[str, ...]:
         plain(f"frame {listed(topic.frames)}") if any(topic.frames) else "no frame",
         "header times" if topic.header_times else "log times only",
     )
-
-
-def _columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()

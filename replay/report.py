@@ -56,6 +56,7 @@ class ReportBuilder:
         self._searched: dict[Pair, Json] = {}
         self._refused: dict[str, Counter[str]] = {}
         self._damaged: set[str] = set()
+        self._first_ns: int | None = None
 
     def skip(self, event: Skipped) -> None:
         """Count a message, or a part of a recording, that was not used."""
@@ -84,6 +85,7 @@ class ReportBuilder:
 
     def take(self, stamp_ns: int, result: MergeResult, priors: Mapping[str, Prior] | None = None) -> None:
         """Take in what a tick brought, and what was believed of the robots' places before it."""
+        self._first_ns = stamp_ns if self._first_ns is None else self._first_ns
         self._priors = priors or {}
         self._updates.update(result.updated)
         for change in result.changes:
@@ -108,6 +110,7 @@ class ReportBuilder:
         return {
             "schema": SCHEMA,
             "version": self._version,
+            "first_stamp_ns": self._first_ns,
             "stamp_ns": stamp_ns,
             "reference": self._robots[0].robot,
             "robots": {

@@ -1,25 +1,43 @@
-"""Reports that were written, read back: from ``OUT.json``, or from the ``OUT.mcap`` beside it."""
+"""The report of a run that was made before: its JSON file, or the last report in its MCAP."""
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from replay.errors import InputError
+from replay.events import Report
+from replay.options import TimeBound
 from replay.report import SCHEMA
+from replay.sources.base import Encoding
+from replay.sources.boundary import translated
+from replay.sources.mcap_file import McapFile
+from replay.sources.mcap_records import MAGIC
+from replay.topics import REPORT_TOPIC
 
-_TOPIC = "/merged/report"
+MOST_BYTES = 256 << 20
+_HEAD_BYTES = 4096
+_EXPECTED = "expected a report that `replay merge` wrote: OUT.json, or OUT.mcap"
 
 
-def read_report(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the final report of a run.
+class _ReportFile(McapFile):
+    """An MCAP of which reports are read, which are JSON."""
+
+    encodings: ClassVar[Mapping[str, Encoding]] = {"json": "json"}
+
+
+def read_report(path: str | os.PathLike[str], at: TimeBound | None = None) -> Report:
+    """Return a run's report.
 
     Parameters
     ----------
     path
         The JSON or the MCAP that the run wrote.
+    at
+        As of which time, of an MCAP; None for the last report. Seconds count from the run's first map.
 
     Returns
     -------
@@ -29,36 +47,100 @@ def read_report(path: str | os.PathLike[str]) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If it cannot be read, or is no report.
+        If it is no report, not whole, of another version, or of a time before the first one.
     """
     path = Path(path)
+    if holds_mcap(path):
+        return _from_mcap(path, at)
+    if at is not None:
+        raise InputError(f"{path}: this holds the final report alone; give OUT.mcap for an earlier time")
+    with translated(path):
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise InputError(f"{path}: it has {size} bytes; {_EXPECTED}, of at most {MOST_BYTES}")
+        content = path.read_bytes()
+    return _parsed(path, content)
+
+
+def absolute(path: Path, at: TimeBound) -> TimeBound:
+    """Return a time of a run as one that does not count from its first map."""
+    return TimeBound(_bound_ns(path, read_report(path), at), relative=False)
+
+
+def holds_mcap(path: Path) -> bool:
+    """Tell whether a file begins as an MCAP does."""
+    return _head(path).startswith(MAGIC)
+
+
+def holds_report(path: Path) -> bool:
+    """Tell whether this is a run that was made before: JSON, or an MCAP with reports in it."""
+    if not path.is_file():
+        return False
+    head = _head(path)
+    if head.startswith(MAGIC):
+        with _ReportFile(path) as file:
+            return any(topic.name == REPORT_TOPIC for topic in file.info.topics)
+    return head.lstrip().startswith(b"{")
+
+
+def _head(path: Path) -> bytes:
+    with translated(path):
+        if not path.exists():
+            raise InputError(f"{path}: it does not exist; {_EXPECTED}")
+        if not path.is_file():
+            raise InputError(f"{path}: this is no regular file; {_EXPECTED}")
+        with path.open("rb") as file:
+            return file.read(_HEAD_BYTES)
+
+
+def _from_mcap(path: Path, at: TimeBound | None) -> Report:
+    last: Report | None = None
+    with _ReportFile(path, most_bytes=MOST_BYTES) as file:
+        if not any(topic.name == REPORT_TOPIC for topic in file.info.topics):
+            raise InputError(f"{path}: it holds no {REPORT_TOPIC}; {_EXPECTED}")
+        for report in _reports(file):
+            if at is not None and report["stamp_ns"] is not None and report["stamp_ns"] > _bound_ns(path, report, at):
+                break
+            last = report
+        losses = file.losses.all
+    if losses:
+        raise InputError(
+            f"{path}: {losses[0].place}: {losses[0].detail}; its last report may be lost: give OUT.json, or merge again"
+        )
+    if last is None:
+        raise InputError(f"{path}: {'there is no report' if at is None else 'the run begins after that time'}")
+    return last
+
+
+def _reports(file: McapFile) -> Iterator[Report]:
+    for message in file.messages([REPORT_TOPIC]):
+        yield _parsed(file.path, bytes(message.data))
+
+
+def _bound_ns(path: Path, report: Report, at: TimeBound) -> int:
+    if not at.relative:
+        return at.ns
+    first_ns = report.get("first_stamp_ns")
+    if not isinstance(first_ns, int):
+        raise InputError(f"{path}: its report does not say when the run began; give the time as nanoseconds with ns")
+    return at.absolute_ns(first_ns)
+
+
+def _parsed(path: Path, content: bytes) -> dict[str, Any]:
     try:
-        text = _last_in_mcap(path) if path.suffix == ".mcap" else path.read_bytes()
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: there is no such file") from error
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; give another path") from error
-    try:
-        report = json.loads(text)
-    except ValueError as error:  # also of bytes that are no text
-        raise InputError(f"{path}: is no JSON; expected the report of a run, OUT.json") from error
-    if not isinstance(report, dict) or report.get("schema") != SCHEMA:
-        raise InputError(f"{path}: is no report of a run; expected JSON whose schema is {SCHEMA!r}")
+        report = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        ends = "it is empty" if not content.strip() else f"this is no JSON, or it was cut off ({_one_line(error)})"
+        raise InputError(f"{path}: {ends}; {_EXPECTED}") from error
+    if not isinstance(report, dict) or not isinstance(report.get("schema"), str):
+        raise InputError(f'{path}: this is JSON of something else; {_EXPECTED}, with "schema": "{SCHEMA}"')
+    if report["schema"] != SCHEMA:
+        raise InputError(
+            f"{path}: this is a report of the form {report['schema']!r}, and {SCHEMA} is read; merge again, or use the "
+            f"version of replay that wrote it"
+        )
     return report
 
 
-def _last_in_mcap(path: Path) -> bytes:
-    """Return the last report in an MCAP; it is the final one."""
-    from mcap.exceptions import McapError
-    from mcap.reader import SeekingReader
-    from zstandard import ZstdError
-
-    with path.open("rb") as stream:
-        try:
-            messages = SeekingReader(stream).iter_messages([_TOPIC], reverse=True)
-            found = next(iter(messages), None)
-        except (McapError, ZstdError, ValueError) as error:
-            raise InputError(f"{path}: cannot be read as an MCAP; give the report, OUT.json") from error
-    if found is None:
-        raise InputError(f"{path}: holds no report of a run; expected an MCAP that `replay merge` wrote")
-    return found[2].data
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__

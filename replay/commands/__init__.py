@@ -55,6 +55,12 @@ COMMANDS: dict[str, Command] = {
     "recover": Command(
         "replay.commands.recover", "main job", "make a readable MCAP of one that was cut off, such as OUT.mcap.partial"
     ),
+    "export": Command(
+        "replay.commands.export", "after a run", "write maps as map_server loads them, pictures, or transforms"
+    ),
+    "evaluate": Command("replay.commands.evaluate", "after a run", "hold a run against known truth"),
+    "check": Command("replay.commands.check", "in CI", "merge, and hold the outcome against what is expected"),
+    "compare": Command("replay.commands.compare", "in CI", "list what differs between two runs"),
     "config": Command("replay.commands.config", "about replay", "print the settings that a run would have, as a file"),
 }
 """In the order in which they are listed."""

@@ -46,26 +46,12 @@ def run(options: argparse.Namespace) -> int:
     run = inputs.run_options(options)
     written = outputs.output_options(options, run)
 
-    from replay.outputs import refuse_outputs
+    from replay.run_merge import Run
 
-    refuse_outputs(written, [item.path for item in run.runs])
-
-    import cv2
-
-    from replay.pipeline import drain, events
-    from replay.plan import open_plan
-    from replay.sinks import open_sinks
-    from replay.sinks.terminal import Narrator, ProgressSink, open_notes
-
-    cv2.setNumThreads(1)  # the threads are our own, see --jobs
-    notes = open_notes()
-    narrator = Narrator(notes, announce=run.robots is None)
+    merging = Run(run, written)
+    narrator = merging.narrator
     try:
-        with open_plan(run) as plan:
-            refuse_outputs(written, plan.files())
-            narrator.unused_topics = plan.unused_topics()
-            with open_sinks(written, (ProgressSink(notes), narrator), say=narrator.say) as sinks:
-                report = drain(events(plan, run, written), sinks, run.jobs).report
+        report = merging.merge()
         status = EXIT_DIFFERS if options.require_all and not _all_merged(report) else EXIT_DONE
         _tell(report, written, narrator, as_json=options.json)
     except KeyboardInterrupt:

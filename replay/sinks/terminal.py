@@ -145,7 +145,7 @@ class Narrator:
         spent_s = perf_counter() - self._begin_s
         self.say(
             f"{counted(report['updates'], 'map')} at {counted(self._ticks, 'time')} in {spent_s:.1f} s: "
-            f"{self._merge_s:.1f} s merging, {self._render_s:.1f} s drawing; wrote {', '.join(paths)}"
+            f"{self._merge_s:.1f} s merging, {self._render_s:.1f} s drawing; wrote {', '.join(paths) or 'nothing'}"
         )
 
     def say(self, text: str) -> None:

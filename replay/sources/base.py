@@ -10,7 +10,8 @@ from typing import Literal, Protocol, Self
 
 from replay.sources.losses import Losses
 
-Encoding = Literal["cdr", "ros1"]
+Encoding = Literal["cdr", "ros1", "json"]
+"""The last is that of reports alone: no map is read from it."""
 
 GRID_TYPE = "nav_msgs/msg/OccupancyGrid"
 UPDATE_TYPE = "map_msgs/msg/OccupancyGridUpdate"

@@ -7,10 +7,11 @@ from contextlib import ExitStack
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
+from typing import ClassVar
 
 from replay.errors import InputError
 from replay.skip_cause import SkipCause
-from replay.sources.base import RawMessage, SourceInfo
+from replay.sources.base import Encoding, RawMessage, SourceInfo
 from replay.sources.boundary import TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
 from replay.sources.lapses import lapse_of
@@ -61,6 +62,9 @@ class McapFile(Closing):
     map_scan
         What a pass through the file found of its maps; None as long as no pass was needed.
     """
+
+    encodings: ClassVar[Mapping[str, Encoding]] = ENCODINGS
+    """Which encodings of messages are read."""
 
     def __init__(
         self, path: Path, copy_of: Path | None = None, map_scan: Scan | None = None, most_bytes: int = MOST_BYTES
@@ -158,10 +162,10 @@ class McapFile(Closing):
         channels = (contents or self._contents).channels
         wanted = {key: each for key, each in channels.items() if each.topic in topics and not each.problem}
         for channel in wanted.values():
-            if channel.encoding not in ENCODINGS:
+            if channel.encoding not in self.encodings:
                 raise InputError(
                     f"{self.path}: topic {channel.topic} is encoded as '{channel.encoding}'; "
-                    f"{' or '.join(ENCODINGS)} is read: convert the recording, or choose another topic"
+                    f"{' or '.join(self.encodings)} is read: convert the recording, or choose another topic"
                 )
         return wanted
 
@@ -211,7 +215,7 @@ class McapFile(Closing):
             if data is None:
                 continue
             channel = wanted[entry.channel]
-            encoding = ENCODINGS[channel.encoding]
+            encoding = self.encodings[channel.encoding]
             if encoding == "cdr":
                 try:
                     data = decompressed_cdr(data, self._file.most_bytes)

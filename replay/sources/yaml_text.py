@@ -43,10 +43,11 @@ def load_yaml(path: Path) -> object:
         size = path.stat().st_size
         if size > MOST_BYTES:
             raise InputError(f"{path}: it has {size} bytes; expected a description of {MOST_BYTES} bytes at most")
-        return _reader(path).load(path.read_text(encoding="utf-8"))
+        return reader(path).load(path.read_text(encoding="utf-8"))
 
 
-def _reader(path: Path) -> YAML:
+def reader(path: Path) -> YAML:
+    """Return what reads a file, within these limits."""
     from ruamel.yaml import YAML
     from ruamel.yaml.composer import Composer
     from ruamel.yaml.events import AliasEvent

@@ -1,0 +1,67 @@
+"""An ``expect.yaml`` for runs like one that was made, so that nobody types poses."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+
+from replay.checks.expectation import WITHIN_DEG, WITHIN_M
+from replay.plain_text import plain_json
+from replay.run_result import RobotResult, RunResult
+
+_SHARE_LESS = 0.02
+_AREA_SHARE = 0.9
+_TIMES_LATER = 1.2
+_LATER_S = 5.0
+_DIGITS = 3
+
+
+def expectation_text(result: RunResult) -> str:
+    """Return an expectation that a run meets, with some leeway, as the text of a YAML file."""
+    return "\n".join(_lines(result)) + "\n"
+
+
+def _lines(result: RunResult) -> Iterator[str]:
+    yield f"# What `replay check` expects; written from a run of replay {result.version}. Change it as you need."
+    yield f"reference: {_name(result.reference)}"
+    yield "other_robots: forbidden"
+    yield f"max_skipped: {sum(result.skipped.values())}"
+    yield "defaults:  # of robots that are to be merged"
+    yield f"  within_m: {WITHIN_M:g}  # of the pose, at the origin of the robot's map frame"
+    yield f"  within_deg: {WITHIN_DEG:g}"
+    yield "robots:"
+    for robot in result.robots.values():
+        yield from _robot(robot)
+
+
+def _robot(robot: RobotResult) -> Iterator[str]:
+    name, pose = _name(robot.robot), robot.merged_from_map
+    if robot.status == "reference":
+        yield f"  {name}: reference"
+    elif robot.status != "merged" or pose is None:
+        yield f"  {name}: {{status: {robot.status}, reason: {robot.reason}}}"
+    else:
+        yield f"  {name}:"
+        yield "    status: merged"
+        numbers = {"x_m": pose.x_m, "y_m": pose.y_m, "yaw_deg": math.degrees(pose.yaw_rad)}
+        if pose.scale != 1.0:
+            numbers["scale"] = pose.scale
+        yield f"    pose: {{{', '.join(f'{key}: {round(value, _DIGITS) + 0.0}' for key, value in numbers.items())}}}"
+        yield from _limits(robot)
+
+
+def _limits(robot: RobotResult) -> Iterator[str]:
+    """Yield the limits that are a little less than what was reached."""
+    for key, value in (("min_acceptance", robot.acceptance), ("min_confidence", robot.confidence)):
+        if value is not None:
+            yield f"    {key}: {max(0.0, math.floor((value - _SHARE_LESS) * 100) / 100):g}"
+    if robot.overlap_m2 is not None:
+        yield f"    min_overlap_m2: {math.floor(robot.overlap_m2 * _AREA_SHARE)}"
+    if robot.merged_after_s is not None:
+        yield f"    merged_within_s: {math.ceil(max(0.0, robot.merged_after_s) * _TIMES_LATER + _LATER_S)}"
+
+
+def _name(name: str) -> str:
+    """Return a name in double quotes, in which JSON and YAML are alike."""
+    return plain_json(json.dumps(name, ensure_ascii=False))

@@ -1,0 +1,197 @@
+"""`replay check`: whether a run comes out as expected."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from replay.errors import OutputError, ReplayError, UsageError
+from replay.exit_status import EXIT_DIFFERS, EXIT_DONE, interrupted_late
+from replay.flags import inputs, outputs, placing, rules
+from replay.standard_streams import printing, say, takes
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from replay.checks.findings import Finding
+    from replay.events import Report
+    from replay.run_result import RunResult
+
+USAGE = "RUN [RUN ...] --expect EXPECT.yaml [options]"
+DESCRIPTION = """\
+Merge recordings as `replay merge` does, and hold the outcome against what is expected: who is merged, where,
+how surely and how soon. Nothing is merged if RUN is an OUT.json or OUT.mcap of a run that was made before.
+Of a run, only what is asked for is written: with --output what `replay merge` writes.
+"""
+EPILOG = """\
+An expectation says for each robot what is to become of it, and of what is to be merged where and how surely:
+
+  robots:
+    r1: reference
+    r2:
+      status: merged
+      pose: {x_m: 28.16, y_m: 0.9, yaw_deg: 124.9}
+      min_acceptance: 0.95
+      merged_within_s: 240
+
+--write-expect writes one from a run. All keys are in docs/ci.md, with an example for GitHub Actions.
+
+examples:
+  replay check run.mcap --robots r1,r2 --write-expect expect.yaml
+  replay check run.mcap --robots r1,r2 --expect expect.yaml
+  replay check run.mcap --expect expect.yaml --junit replay.xml --summary "$GITHUB_STEP_SUMMARY"
+  replay check out/floor.json --expect expect.yaml
+
+exit status: 0 all is as expected, or the expectation is written; 1 something is not; 2 bad usage or input;
+3 an output could not be written, or a bug; 130 interrupted
+"""
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add recordings, all flags of a run, and those of what is expected."""
+    inputs.add(parser)
+    group = parser.add_argument_group("what is expected")
+    group.add_argument("--expect", metavar="EXPECT.yaml", type=Path, help="hold the outcome against this")
+    group.add_argument(
+        "--write-expect", metavar="EXPECT.yaml", type=Path, help="write what this run meets, with some leeway"
+    )
+    group.add_argument("--junit", metavar="OUT.xml", type=Path, help="write the findings as JUnit XML; replaces it")
+    group.add_argument("--summary", metavar="FILE", help="append the findings to this file as Markdown")
+    placing.add(parser)
+    outputs.add(parser)
+    rules.add(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Merge, and say what is not as expected."""
+    if (options.expect is None) == (options.write_expect is None):
+        raise UsageError("give either --expect EXPECT.yaml or --write-expect EXPECT.yaml")
+    if options.write_expect is not None and (options.junit or options.summary):
+        raise UsageError("--junit and --summary tell what is expected: give them with --expect")
+    try:
+        return _write_expectation(options) if options.write_expect is not None else _check(options)
+    except KeyboardInterrupt:
+        if not getattr(options, "is_published", lambda: False)():
+            raise
+        return interrupted_late()
+
+
+def _check(options: argparse.Namespace) -> int:
+    from replay.checks.expectation import load_expectation
+    from replay.checks.findings import findings
+
+    expectation = load_expectation(options.expect)  # before anything long begins
+    _refuse_files(options)
+    try:
+        result, report = _result(options)
+        found = findings(expectation, result)
+        _write_findings(found, options)
+    except ReplayError as error:
+        if options.junit is not None and not isinstance(error, OutputError):
+            _write_error(str(error), options)
+        raise
+    _tell(found, report, as_json=options.json)
+    return EXIT_DONE if all(item.holds for item in found) else EXIT_DIFFERS
+
+
+def _write_expectation(options: argparse.Namespace) -> int:
+    from replay.checks.write_expectation import expectation_text
+    from replay.written_files import refuse_files, write_files
+
+    path: Path = options.write_expect
+    refuse_files([path], _inputs(options), force=options.force)
+    result, _ = _result(options)
+    write_files({path: expectation_text(result).encode()}, force=options.force)
+    say(f"replay: wrote {path}; look at it, and give it with --expect")
+    return EXIT_DONE
+
+
+def _result(options: argparse.Namespace) -> tuple[RunResult, Report]:
+    """Return what came of the run, made now or before."""
+    from replay.report_file import holds_report, read_report
+    from replay.run_result import RunResult
+
+    (first, *others) = options.runs
+    path = Path(first)
+    if not others and holds_report(path):
+        if options.output is not None:
+            raise UsageError(
+                f"--output {options.output}: nothing is merged, because {path} is a run that was made before"
+            )
+        report = read_report(path)
+        return RunResult.of(report, path), report
+    report = _merged(options)
+    return RunResult.of(report, path), report
+
+
+def _merged(options: argparse.Namespace) -> Report:
+    from replay.run_merge import Run
+    from replay.sinks import output_paths
+
+    if options.output is None:
+        options.images = "none"
+    run_options = inputs.run_options(options)
+    written = outputs.output_options(options, run_options) if options.output is not None else None
+    merging = Run(run_options, written)
+    options.is_published = lambda: written is not None and merging.narrator.is_published
+    report = merging.merge()
+    paths = output_paths(written).values() if written is not None else ()
+    merging.narrator.sum_up(report, [str(path) for path in paths])
+    return report
+
+
+def _inputs(options: argparse.Namespace) -> list[Path]:
+    from replay.runs import RunPath
+
+    paths = [RunPath.parse(text).path for text in options.runs]
+    return [*paths, *([options.expect] if options.expect is not None else [])]
+
+
+def _refuse_files(options: argparse.Namespace) -> None:
+    """Refuse files that could not be written in the end."""
+    from replay.written_files import refuse_files
+
+    if options.summary == "":
+        raise UsageError('--summary: the name is empty; is the variable set, as "$GITHUB_STEP_SUMMARY" is in a job?')
+    paths = [path for path in (options.junit, Path(options.summary) if options.summary else None) if path is not None]
+    refuse_files(paths, _inputs(options), force=True)
+
+
+def _write_findings(found: Sequence[Finding], options: argparse.Namespace) -> None:
+    from replay.checks.junit import junit_xml
+    from replay.checks.words import summary
+    from replay.sinks.partial_file import output_errors
+    from replay.written_files import write_files
+
+    title = ", ".join(Path(text).name for text in options.runs)
+    if options.junit is not None:
+        write_files({options.junit: junit_xml(found, title)}, force=True)
+    if options.summary:
+        path = Path(options.summary)
+        with output_errors(path), path.open("a", encoding="utf-8") as file:
+            file.write(summary(found, title))
+
+
+def _write_error(message: str, options: argparse.Namespace) -> None:
+    from replay.checks.junit import junit_error_xml
+    from replay.written_files import write_files
+
+    title = ", ".join(Path(text).name for text in options.runs)
+    write_files({options.junit: junit_error_xml(message, title)}, force=True)
+
+
+def _tell(found: Sequence[Finding], report: Report, *, as_json: bool) -> None:
+    from replay.checks.words import FAILS, HOLDS, failing, lines
+    from replay.sinks.json_file import report_text
+
+    with printing():
+        if as_json:
+            text = report_text(report)
+            sys.stdout.write(text if takes(text) else report_text(report, is_ascii=True))
+            for line in failing(found):
+                say(f"replay: {line}")
+            return
+        for line in lines(found, is_ascii=not takes(HOLDS + FAILS)):
+            print(line)

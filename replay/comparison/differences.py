@@ -1,0 +1,212 @@
+"""What differs between the outcomes of two runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from mapmerge.sim2 import Sim2, wrap_angle
+from replay.errors import UsageError
+from replay.run_result import RobotResult, RunResult
+
+_DIGITS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """How much may differ.
+
+    Parameters
+    ----------
+    distance_m, angle_deg
+        Of poses: at the origin of the robot's map frame, and of the turn.
+    share
+        Of acceptance and confidence; and of scale, as a share of it.
+    area_share
+        Of overlaps, as a share of the larger one.
+    time_s
+        Of when a robot was placed first.
+    """
+
+    distance_m: float = 0.05
+    angle_deg: float = 0.5
+    share: float = 0.02
+    area_share: float = 0.05
+    time_s: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("distance_m", "angle_deg", "share", "area_share", "time_s"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise UsageError(f"a tolerance is {getattr(self, name)}; expected a number, 0 or more")
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """Something that is not as it was.
+
+    Parameters
+    ----------
+    robot
+        Whose; "" of the run.
+    what
+        What differs: appeared, vanished, placed, lost, status, reason, moved, acceptance, confidence, overlap, time,
+        reference, skipped.
+    before, after
+        What was, and what is, in words.
+    detail
+        By how much, in words.
+    amounts
+        The same as numbers, by names that carry their units.
+    """
+
+    robot: str
+    what: str
+    before: str
+    after: str
+    detail: str = ""
+    amounts: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Two runs side by side.
+
+    Parameters
+    ----------
+    differences
+        What is not as it was, beyond the tolerances.
+    notes
+        What a reader should know of it: none of it is a difference of outcomes.
+    """
+
+    differences: tuple[Difference, ...]
+    notes: tuple[str, ...]
+
+
+def compare(before: RunResult, after: RunResult, tolerance: Tolerance) -> Comparison:
+    """Return what differs between two runs.
+
+    Poses are compared in the first run's merged frame. Where the reference is another robot, those of the second run
+    are taken there by the place of the first reference in it; where it has none, poses cannot be compared.
+    """
+    frame = _before_from_after(before, after)
+    found = [*_of_run(before, after)]
+    for robot in dict.fromkeys([*before.robots, *after.robots]):
+        one, other = before.robots.get(robot), after.robots.get(robot)
+        if one is None and other is not None:
+            found.append(Difference(robot, "appeared", "–", other.status, other.message))
+        elif other is None and one is not None:
+            found.append(Difference(robot, "vanished", one.status, "–"))
+        elif one is not None and other is not None:
+            found.extend(_of_robot(one, other, frame, tolerance))
+    return Comparison(tuple(found), tuple(_notes(before, after, frame)))
+
+
+def _before_from_after(before: RunResult, after: RunResult) -> Sim2 | None:
+    """Return where the second run's merged frame lies in the first one's; None if nothing tells."""
+    if before.reference == after.reference:
+        return Sim2()
+    there = after.robots.get(before.reference)
+    return there.merged_from_map.inverse() if there is not None and there.merged_from_map is not None else None
+
+
+def _of_run(before: RunResult, after: RunResult) -> Iterator[Difference]:
+    if before.reference != after.reference:
+        yield Difference("", "reference", before.reference, after.reference)
+    for cause in sorted({*before.skipped, *after.skipped}):
+        one, other = before.skipped.get(cause, 0), after.skipped.get(cause, 0)
+        if one != other:
+            yield Difference("", "skipped", str(one), str(other), f"{cause}: {other - one:+d}", {cause: other - one})
+
+
+def _of_robot(one: RobotResult, other: RobotResult, frame: Sim2 | None, tolerance: Tolerance) -> Iterator[Difference]:
+    if one.is_placed != other.is_placed:
+        yield Difference(one.robot, "placed" if other.is_placed else "lost", one.status, other.status, other.message)
+    elif one.status != other.status and not one.is_placed:
+        yield Difference(one.robot, "status", one.status, other.status, other.message)
+    if one.reason != other.reason and not (one.is_placed or other.is_placed):
+        yield Difference(one.robot, "reason", one.reason, other.reason, other.message)
+    if one.is_placed != other.is_placed:
+        return
+    if frame is not None and one.merged_from_map is not None and other.merged_from_map is not None:
+        yield from _moved(one.robot, one.merged_from_map, frame @ other.merged_from_map, tolerance)
+    yield from _figures(one, other, tolerance)
+
+
+def _moved(robot: str, one: Sim2, other: Sim2, tolerance: Tolerance) -> Iterator[Difference]:
+    dx_m, dy_m = other.x_m - one.x_m, other.y_m - one.y_m
+    turn_deg = math.degrees(wrap_angle(other.yaw_rad - one.yaw_rad))
+    ratio = other.scale / one.scale
+    is_same_place = math.hypot(dx_m, dy_m) <= tolerance.distance_m
+    if is_same_place and abs(turn_deg) <= tolerance.angle_deg and abs(ratio - 1.0) <= tolerance.share:
+        return
+    distance_m = math.hypot(dx_m, dy_m)
+    detail = f"by {distance_m:.3f} m (x {dx_m:+.3f}, y {dy_m:+.3f}), turned by {turn_deg:+.2f}°"
+    if ratio != 1.0:
+        detail += f", scaled by {ratio:.4f}"
+    amounts = {"distance_m": distance_m, "dx_m": dx_m, "dy_m": dy_m, "turn_deg": turn_deg, "scale_ratio": ratio}
+    yield Difference(robot, "moved", pose_words(one), pose_words(other), detail, _rounded(amounts))
+
+
+def _figures(one: RobotResult, other: RobotResult, tolerance: Tolerance) -> Iterator[Difference]:
+    """Yield the figures that differ; of a refused robot they are those of its best candidate, and say nothing."""
+    if not one.is_placed:
+        return
+    for name in ("acceptance", "confidence"):
+        yield from _figure(one.robot, name, getattr(one, name), getattr(other, name), tolerance.share, "{:.3f}")
+    largest = max(one.overlap_m2 or 0.0, other.overlap_m2 or 0.0)
+    allowed_m2 = tolerance.area_share * largest
+    yield from _figure(one.robot, "overlap", one.overlap_m2, other.overlap_m2, allowed_m2, "{:.1f} m²")
+    if one.status == other.status == "merged":
+        yield from _figure(one.robot, "time", one.merged_after_s, other.merged_after_s, tolerance.time_s, "{:.1f} s")
+
+
+def _figure(
+    robot: str, what: str, one: float | None, other: float | None, allowed: float, form: str
+) -> Iterator[Difference]:
+    # a figure that one version tells and another does not is no change of the outcome
+    if one is None or other is None or abs(other - one) <= allowed:
+        return
+    sign = "+" if other > one else "−"
+    detail = sign + form.format(abs(other - one))
+    amounts = _rounded({"before": one, "after": other})
+    yield Difference(robot, what, form.format(one), form.format(other), detail, amounts)
+
+
+def _rounded(amounts: Mapping[str, float]) -> dict[str, float]:
+    return {name: round(value, _DIGITS) + 0.0 for name, value in amounts.items()}
+
+
+def pose_words(pose: Sim2) -> str:
+    """Return a pose in words."""
+    return f"x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, yaw {math.degrees(pose.yaw_rad):.2f}°"
+
+
+def _notes(before: RunResult, after: RunResult, frame: Sim2 | None) -> Iterator[str]:
+    if before.version != after.version:
+        yield f"made by replay {before.version} and by replay {after.version}"
+    if before.digests != after.digests:
+        names = sorted(name for name in {*before.digests, *after.digests} if _differs(before, after, name))
+        yield f"the inputs are not the same: {', '.join(names)}"
+    changed = sorted(_changed(before.settings, after.settings))
+    if changed:
+        yield f"the settings are not the same: {', '.join(changed)}"
+    if frame is None:
+        yield (
+            f"poses cannot be compared: the first run's are in the frame of {before.reference}, which the second one "
+            "did not place"
+        )
+
+
+def _differs(before: RunResult, after: RunResult, name: str) -> bool:
+    return before.digests.get(name) != after.digests.get(name)
+
+
+def _changed(one: object, other: object, name: str = "") -> Iterator[str]:
+    """Yield the names of settings that differ."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        for key in {**one, **other}:
+            yield from _changed(one.get(key), other.get(key), f"{name}.{key}" if name else str(key))
+    elif one != other:
+        yield name

@@ -1,0 +1,1 @@
+"""`replay evaluate`: how far a run is from known truth."""

@@ -1,0 +1,106 @@
+"""What is truly so of the robots of a run: ``NAME.truth.json``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from mapmerge.sim2 import IDENTITY, Sim2
+from replay.documents import Node
+from replay.errors import InputError
+from replay.read_document import read_json
+
+
+@dataclass(frozen=True, slots=True)
+class RobotTruth:
+    """What is known of one robot's map.
+
+    Parameters
+    ----------
+    reference_from_map
+        Where its map frame truly lies in the reference's; None if its map is of another place.
+    at_m
+        The point of its map frame at which positions are compared: the middle of what it shares with others.
+    """
+
+    reference_from_map: Sim2 | None
+    at_m: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What is known of a run.
+
+    Parameters
+    ----------
+    reference
+        The robot in whose map frame poses are.
+    robots
+        The others, by name.
+    reference_from_true_map
+        Where the true map's frame lies in the reference's; None if nothing is said.
+    """
+
+    reference: str
+    robots: Mapping[str, RobotTruth]
+    reference_from_true_map: Sim2 | None
+
+    def seen_from(self, robot: str, file: Path) -> Truth:
+        """Return the same with another robot as the reference.
+
+        Raises
+        ------
+        InputError
+            If nothing is known of it, or its map is of another place.
+        """
+        if robot == self.reference:
+            return self
+        known = self.robots.get(robot)
+        if known is None or known.reference_from_map is None:
+            raise InputError(
+                f"{file}: it says nothing of how {robot}, the run's reference, lies to {self.reference}; merge with "
+                f"--robots {self.reference},… or give a truth that does"
+            )
+        own_from_reference = known.reference_from_map.inverse()
+        poses = {self.reference: RobotTruth(IDENTITY, (0.0, 0.0)), **self.robots}
+        return Truth(
+            robot,
+            {
+                name: RobotTruth(item.reference_from_map and own_from_reference @ item.reference_from_map, item.at_m)
+                for name, item in poses.items()
+                if name != robot
+            },
+            self.reference_from_true_map and own_from_reference @ self.reference_from_true_map,
+        )
+
+
+def load_truth(path: Path) -> Truth:
+    """Read a truth file; keys that are not used are left alone.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    node = read_json(path)
+    return Truth(
+        node.need("reference").text(),
+        {name: _robot(item) for name, item in node.need("robots").items()},
+        node.maybe("reference_from_true_map", _pose),
+    )
+
+
+def _robot(node: Node) -> RobotTruth:
+    same_place = node.maybe("same_place", Node.truth)
+    return RobotTruth(
+        None if same_place is False else _pose(node),
+        node.maybe("overlap_centre_m", Node.place_m) or (0.0, 0.0),
+    )
+
+
+def _pose(node: Node) -> Sim2:
+    degrees = node.maybe("yaw_deg", Node.number)
+    yaw_rad = node.need("yaw_rad").number() if degrees is None else math.radians(degrees)
+    return Sim2(node.need("x_m").number(), node.need("y_m").number(), yaw_rad)

@@ -1,0 +1,107 @@
+"""Which map is exported: that of one topic of a recording, as of a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from mapmerge.grid import Grid
+from replay.arrivals import Tally
+from replay.errors import InputError, UsageError
+from replay.events import Noted, Skipped
+from replay.options import RunOptions, TimeBound
+from replay.plain_text import listed
+from replay.plan import open_plan
+from replay.runs import RunPath, TopicChoice
+from replay.sources import open_source
+from replay.sources.base import GRID_TYPE
+from replay.timeline import Tick, ticks
+from replay.topics import MAP_TOPIC
+
+Say = Callable[[Skipped | Noted], None]
+"""Is told what of a recording is not used, and what else is to be known of it."""
+
+THE_MAP = "map"
+"""What stands for the robot where a map is no robot's."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Maps:
+    """Maps as of a time.
+
+    Parameters
+    ----------
+    grids
+        By robot.
+    stamp_ns
+        When the last of them was recorded.
+    files
+        What they were read from.
+    """
+
+    grids: Mapping[str, Grid]
+    stamp_ns: int
+    files: tuple[Path, ...]
+
+
+def one_map(path: Path, topic: str | None, at: TimeBound | None, say: Say) -> Maps:
+    """Return the map of one topic: the last one, or that of a time; the merged one if no topic is named.
+
+    Raises
+    ------
+    ReplayError
+        If there is none.
+    """
+    chosen = _topic(path, topic)
+    options = RunOptions((RunPath(None, path),), (THE_MAP,), (TopicChoice(THE_MAP, chosen),))
+    return maps_at(options, at, say)
+
+
+def maps_at(options: RunOptions, at: TimeBound | None, say: Say) -> Maps:
+    """Return all robots' maps as they were at a time; the last ones if none is named.
+
+    Raises
+    ------
+    ReplayError
+        If there is none.
+    """
+    grids: dict[str, Grid] = {}
+    first_ns = stamp_ns = None
+    with open_plan(options) as plan:
+        for item in ticks(plan.feeds, tuple(Tally() for _ in plan.feeds), plan.window, strict=False):
+            if isinstance(item, Skipped | Noted):
+                say(item)
+            elif isinstance(item, Tick):
+                first_ns = item.stamp_ns if first_ns is None else first_ns
+                if at is not None and item.stamp_ns > at.absolute_ns(first_ns):
+                    break
+                grids.update(item.grids)
+                stamp_ns = item.stamp_ns
+        files = tuple(plan.files())
+    if stamp_ns is None:
+        paths = ", ".join(str(run.path) for run in options.runs)
+        raise InputError(f"{paths}: there is no map {'' if at is None else 'by that time '}that can be used")
+    return Maps(grids, stamp_ns, files)
+
+
+def grid_topics(path: Path) -> list[str]:
+    """Return the topics of a recording that hold maps, in order of name."""
+    with open_source(path) as source:
+        return [topic.name for topic in source.info.topics if topic.msgtype == GRID_TYPE and topic.message_count]
+
+
+def _topic(path: Path, topic: str | None) -> str:
+    there = grid_topics(path)
+    if topic is not None:
+        if topic not in there:
+            raise UsageError(f"--topic {topic}: {path} has no map on it; there are: {listed(there) or 'none'}")
+        return topic
+    if MAP_TOPIC in there:
+        return MAP_TOPIC
+    if len(there) == 1:
+        return there[0]
+    if not there:
+        raise InputError(f"{path}: there is no map in it; expected a topic of type {GRID_TYPE}, such as {MAP_TOPIC}")
+    flags = listed([f"--topic {each}" for each in there], "  ")
+    raise UsageError(f"{path} has {len(there)} maps; choose one of: {flags}")

@@ -1,0 +1,52 @@
+"""Where maps lie, as lines for the shell: static transforms from the merged frame to the robots' map frames."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Sequence
+
+from mapmerge.sim2 import Sim2
+from replay.plain_text import plain
+from replay.plan import MERGED_FRAME
+from replay.run_result import RobotResult, RunResult
+
+
+def lines(result: RunResult, robots: Sequence[str], ros: int) -> Iterator[str]:
+    """Yield a command for each placed robot, and a comment for each other one.
+
+    Parameters
+    ----------
+    ros
+        1 or 2: of which ROS the command is.
+    """
+    yield f"# {result.name.name}: '{MERGED_FRAME}' is the map frame of {plain(result.reference)}, the reference"
+    for name in robots:
+        yield from _robot(result.robots[name], ros)
+
+
+def _robot(robot: RobotResult, ros: int) -> Iterator[str]:
+    pose = robot.merged_from_map
+    if pose is None:
+        yield f"# {plain(robot.robot)} is not placed: {robot.reason}: {plain(robot.message)}"
+    elif pose.scale != 1.0:
+        yield (
+            f"# {plain(robot.robot)} is placed with a scale of {pose.scale:.6f}, which no transform can say: its map's "
+            f"resolution is off by that factor; else {_place(pose)}"
+        )
+    else:
+        yield _command(pose, robot.map_frame, ros)
+
+
+def _place(pose: Sim2) -> str:
+    return f"x {pose.x_m:.6f} y {pose.y_m:.6f} yaw {pose.yaw_rad:.6f}"
+
+
+def _command(pose: Sim2, frame: str, ros: int) -> str:
+    x, y, yaw = (f"{value + 0.0:.6f}" for value in (pose.x_m, pose.y_m, pose.yaw_rad))
+    child = shlex.quote(plain(frame))
+    if ros == 1:
+        return f"rosrun tf2_ros static_transform_publisher {x} {y} 0 {yaw} 0 0 {MERGED_FRAME} {child}"
+    return (
+        f"ros2 run tf2_ros static_transform_publisher --x {x} --y {y} --z 0 --yaw {yaw} --pitch 0 --roll 0 "
+        f"--frame-id {MERGED_FRAME} --child-frame-id {child}"
+    )

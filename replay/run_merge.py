@@ -1,0 +1,70 @@
+"""A run as the command line makes one: merged, written if that is asked for, and told about."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from replay.events import Report
+from replay.options import OutputOptions, RunOptions
+from replay.sinks.base import Sink
+from replay.sinks.terminal import Narrator, ProgressSink, open_notes
+
+
+class Run:
+    """A run of the merger that shows its progress on standard error.
+
+    Parameters
+    ----------
+    options
+        What is read, and how it is merged.
+    written
+        What is written; None for nothing.
+    """
+
+    def __init__(self, options: RunOptions, written: OutputOptions | None) -> None:
+        self._options = options
+        self._written = written
+        self._notes = open_notes()
+        self.narrator = Narrator(self._notes, announce=options.robots is None)
+
+    def merge(self) -> Report:
+        """Merge, and return the report.
+
+        Raises
+        ------
+        ReplayError
+            If an input cannot be read, or an output not be written.
+        """
+        from replay.outputs import refuse_outputs
+
+        if self._written is not None:
+            refuse_outputs(self._written, [item.path for item in self._options.runs])
+
+        import cv2
+
+        from replay.pipeline import drain, events
+        from replay.plan import open_plan
+
+        cv2.setNumThreads(1)  # the threads are our own, see --jobs
+        with open_plan(self._options) as plan:
+            if self._written is not None:
+                refuse_outputs(self._written, plan.files())
+            self.narrator.unused_topics = plan.unused_topics()
+            with self._sinks() as sinks:
+                return drain(events(plan, self._options, self._written), sinks, self._options.jobs).report
+
+    @contextmanager
+    def _sinks(self) -> Iterator[Sequence[Sink]]:
+        from replay.sinks import open_sinks
+
+        shown = (ProgressSink(self._notes), self.narrator)
+        if self._written is not None:
+            with open_sinks(self._written, shown, say=self.narrator.say) as sinks:
+                yield sinks
+            return
+        try:
+            yield shown
+        finally:
+            for sink in shown:
+                sink.finish()

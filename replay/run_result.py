@@ -1,0 +1,152 @@
+"""What came of a run, as values: the part of a report that is compared, checked and evaluated.
+
+Only what is used is read, so that reports of other versions of this program with the same schema serve as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mapmerge.sim2 import Sim2
+from replay.documents import Node
+from replay.events import Report
+
+STATUSES = ("reference", "merged", "unmerged", "no_map")
+_PLACED = ("reference", "merged")
+
+
+@dataclass(frozen=True, slots=True)
+class RobotResult:
+    """What became of one robot's map.
+
+    Parameters
+    ----------
+    status, reason, message
+        What, and why: the code, and in words.
+    merged_from_map
+        Where its map frame lies; None unless placed.
+    acceptance, confidence, overlap_m2
+        How sure that is; None where nothing tells.
+    merged_after_s
+        When it was placed first, in seconds since the run's first map; None if it never was, or nothing tells.
+    map_frame, map_topic
+        What its map is called.
+    """
+
+    robot: str
+    status: str
+    reason: str
+    message: str
+    merged_from_map: Sim2 | None
+    acceptance: float | None
+    confidence: float | None
+    overlap_m2: float | None
+    merged_after_s: float | None
+    map_frame: str
+    map_topic: str
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether its map is in the merged one."""
+        return self.status in _PLACED
+
+
+@dataclass(frozen=True, slots=True)
+class RunResult:
+    """What came of a run.
+
+    Parameters
+    ----------
+    name
+        What the report was read from.
+    reference
+        The robot whose map frame is the merged frame.
+    robots
+        By name, the reference first.
+    skipped
+        Messages that were not used, by cause.
+    version, settings
+        What made the report, and with which settings.
+    digests
+        Digests of the inputs, by name.
+    stamp_ns
+        As of when this is; None if there was no map at all.
+    """
+
+    name: Path
+    reference: str
+    robots: Mapping[str, RobotResult]
+    skipped: Mapping[str, int]
+    version: str
+    settings: Mapping[str, Any]
+    digests: Mapping[str, str]
+    stamp_ns: int | None = None
+
+    @staticmethod
+    def of(report: Report, name: Path) -> RunResult:
+        """Read a report.
+
+        Raises
+        ------
+        InputError
+            If what is used of it is missing or of another kind.
+        """
+        node = Node(name, report)
+        first_ns = node.maybe("first_stamp_ns", Node.whole)
+        return RunResult(
+            name,
+            node.need("reference").text(),
+            {robot: _robot(robot, item, first_ns) for robot, item in node.need("robots").items()},
+            {cause: item.whole() for cause, item in node.need("skipped").items()},
+            node.need("version").text(),
+            {key: item.value for key, item in node.need("settings").items()},
+            _digests(node),
+            node.maybe("stamp_ns", Node.whole),
+        )
+
+
+def pose_of(node: Node) -> Sim2:
+    """Read a pose as reports have it: ``x_m``, ``y_m``, ``yaw_rad`` and, if it is not 1, ``scale``."""
+    scale = node.maybe("scale", Node.number)
+    if scale is not None and scale <= 0.0:
+        node.need("scale").refuse("a number above 0")
+    return Sim2(
+        node.need("x_m").number(),
+        node.need("y_m").number(),
+        node.need("yaw_rad").number(),
+        1.0 if scale is None else scale,
+    )
+
+
+def _robot(robot: str, node: Node, first_ns: int | None) -> RobotResult:
+    status = node.need("status")
+    if status.value not in STATUSES:
+        status.refuse(f"one of {', '.join(STATUSES)}")
+    merged_ns = node.maybe("first_merged_stamp_ns", Node.whole)
+    pose = node.maybe("merged_from_map", pose_of)
+    if (pose is None) == (status.value in _PLACED):
+        node.need("status").refuse("a placed robot to have a pose (merged_from_map), and no other")
+    return RobotResult(
+        robot,
+        status.text(),
+        node.need("reason").need("code").text(),
+        node.need("reason").need("message").text(),
+        pose,
+        node.maybe("acceptance", Node.number),
+        node.maybe("confidence", Node.number),
+        node.maybe("overlap_m2", Node.number),
+        None if merged_ns is None or first_ns is None else (merged_ns - first_ns) / 1e9,
+        node.need("map_frame").text(),
+        node.need("map_topic").text(),
+    )
+
+
+def _digests(node: Node) -> dict[str, str]:
+    inputs = node.need("inputs").value
+    if not isinstance(inputs, list):
+        node.need("inputs").refuse("a list")
+    items = [Node(node.file, item, ("inputs", at)) for at, item in enumerate(inputs)]
+    return {item.need("name").text(): item.maybe("sha256", Node.text) or "" for item in items}

@@ -1,0 +1,52 @@
+"""Small files that are written at once: whole under their final names, or not there; several together, or none."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from replay.errors import UsageError
+from replay.interrupts import held_off
+from replay.outputs import refuse_inputs, refuse_unwritable
+from replay.sinks.partial_file import PartialFile, output_errors, partial_name
+from replay.sinks.publication import aside_name, publish
+
+
+def refuse_files(paths: Sequence[Path], inputs: Sequence[Path], *, force: bool) -> None:
+    """Refuse names of files that could not be written at the end, or would cost an input.
+
+    Raises
+    ------
+    ReplayError
+        With the reason.
+    """
+    refuse_inputs([name(path) for path in paths for name in (Path, partial_name, aside_name)], inputs)
+    existing = [str(path) for path in paths if os.path.lexists(path)]
+    if existing and not force:
+        raise UsageError(f"there is already {', '.join(existing)}; give --force to replace, or another name")
+    for path in paths:
+        refuse_unwritable(path)
+
+
+def write_files(contents: Mapping[Path, bytes], *, force: bool) -> None:
+    """Write files that belong together, all or none; the last one last.
+
+    Raises
+    ------
+    ReplayError
+        If one cannot be written; then all are as they were.
+    """
+    files = [PartialFile(path) for path in contents]
+    try:
+        for file, content in zip(files, contents.values(), strict=True):
+            file.claim()
+            with output_errors(file.path), file.stream() as stream:
+                stream.write(content)
+            file.sync()
+        with held_off():
+            refuse_files(list(contents), (), force=force)
+            publish(files, files, list(contents))
+    finally:
+        for file in files:
+            file.discard()
