@@ -53,15 +53,20 @@ def page(story: Story) -> str:
 
 
 def _title(story: Story) -> str:
+    return f"{_merged(story)} of {counted(len(story.robots), 'map')} merged"
+
+
+def _merged(story: Story) -> int:
+    """Return how many maps are in one merged map; none if there is but one."""
     placed = sum(values["merged_from_map"] is not None for values in story.report["robots"].values())
-    return f"{placed} of {counted(len(story.robots), 'map')} merged"
+    return placed if placed > 1 else 0
 
 
 def _key_figures(story: Story) -> Iterator[tuple[str, str]]:
     report = story.report
     robots_said = report["robots"].values()
-    placed = sum(values["merged_from_map"] is not None for values in robots_said)
-    yield "maps merged", f"{placed} of {len(story.robots)}"
+    if len(story.robots) > 1:
+        yield "maps merged", f"{_merged(story)} of {len(story.robots)}"
     sure = [values["confidence"] for values in robots_said if values["confidence"] is not None]
     agreeing = [
         values["acceptance"]

@@ -144,7 +144,7 @@ def time_axis(story: Story) -> Axis:
 
 def time_marks(over: Axis) -> tuple[Mark, ...]:
     """Return the marks of the axis of time."""
-    return tuple(Mark(over.label(tick), _percent(over.share(tick))) for tick in over.ticks)
+    return tuple(Mark(f"{over.label(tick)} s", _percent(over.share(tick))) for tick in over.ticks)
 
 
 def _plot(

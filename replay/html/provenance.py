@@ -48,13 +48,16 @@ class Provenance:
     settings
         All settings.
     command
-        How to run it again; None where settings were made that no flag can say.
+        How to run it again; None where that cannot be said.
+    why_not
+        Why it cannot.
     """
 
     inputs: tuple[Input, ...]
     changed: tuple[Setting, ...]
     settings: tuple[Setting, ...]
     command: str | None
+    why_not: str
     version: str
     first: str
     last: str
@@ -69,25 +72,27 @@ def provenance(story: Story) -> Provenance:
         for name, value in _flat(story.settings)
     )
     changed = tuple(item for item in settings if item.default is not None)
+    again, why_not = command(story, [item.name for item in changed])
     return Provenance(
         tuple(_input(item) for item in report["inputs"]),
         changed,
         settings,
-        command(story, [item.name for item in changed]),
+        again,
+        why_not,
         report["version"],
         moment(story.first_ns) if story.series.ticks else "",
         moment(story.last_ns) if story.series.ticks else "",
     )
 
 
-def command(story: Story, changed: list[str]) -> str | None:
-    """Return the command that gives this outcome in the folder of its inputs.
-
-    None where a setting differs that no flag can say.
-    """
+def command(story: Story, changed: list[str]) -> tuple[str | None, str]:
+    """Return the command that gives this outcome in the folder of its inputs or, if there is none, why."""
     if any(name.startswith("merge.") and name not in _FLAGS_OF_MERGE for name in changed):
-        return None
-    return shlex.join(["replay", "merge", *_runs(story), *_flags(story)])
+        return None, "It was run from Python, with settings that no flag can say: those above that differ."
+    found = shlex.join(["replay", "merge", *_runs(story), *_flags(story)])
+    if not found.isprintable():
+        return None, "A name in it holds characters that cannot be typed."
+    return found, ""
 
 
 def _runs(story: Story) -> Iterator[str]:

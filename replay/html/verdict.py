@@ -9,9 +9,11 @@ from typing import Literal
 from mapmerge.outcome import ChangeKind, Status
 from mapmerge.reasons import ReasonCode
 from replay.advice import ADVICE
+from replay.events import Report
 from replay.figures import percent, share
 from replay.html.roster import Member
 from replay.html.story import Story
+from replay.plain_text import brief, listed
 from replay.words import counted
 
 Level = Literal["good", "partly", "bad"]
@@ -87,6 +89,9 @@ def _sentence(story: Story, placed: int, merged: int) -> str:
     reference = story.member(story.report["reference"])
     if not placed:
         return f"Nothing is merged: the reference {reference.name} has no usable map."
+    if robots == 2:
+        other = next(member for member in story.roster.values() if member is not reference)
+        return f"Nothing is merged: the map of {other.name} was not placed on that of {reference.name}."
     return f"Nothing is merged: none of the other {robots - 1} maps was placed on that of {reference.name}."
 
 
@@ -101,20 +106,26 @@ def _sure(story: Story, merged: list[str]) -> str:
         name, sure = story.member(least).name, percent(known[least])
         if len(merged) == 1:
             return f"The placement of {name} is right with a probability of {sure}; {need} is required."
-        return f"Each placement is right with a probability of {sure} or more, the least of {name}; {need} is required."
+        return f"The least sure placement, that of {name}, is right with a probability of {sure}; {need} is required."
     agreeing = {robot: robots[robot]["acceptance"] for robot in merged if robots[robot]["acceptance"] is not None}
     least_index = f" The least acceptance index is {share(min(agreeing.values()))}." if agreeing else ""
     return f"The method {merge['method']} does not tell how sure a placement is.{least_index}"
 
 
+def _losses(report: Report) -> Iterator[tuple[str, str]]:
+    """Say of each recording what of it could not be used."""
+    for name in dict.fromkeys(item["input"] for item in report["skipped_at"]):
+        places = [item for item in report["skipped_at"] if item["input"] == name]
+        causes = listed(list(dict.fromkeys(str(item["cause"]).replace("_", " ") for item in places)))
+        is_least = any(item["messages"] is None for item in places)
+        number = sum(1 if item["messages"] is None else item["messages"] for item in places)
+        what = f"{'at least ' if is_least else ''}{counted(number, 'message')} could not be used"
+        yield f"{brief(name)}: {what if number else 'damaged, at no cost of messages'} ({causes})", "losses"
+
+
 def _troubles(story: Story) -> Iterator[tuple[str, str]]:
     report = story.report
-    skipped = sum(report["skipped"].values())
-    if skipped:
-        least = any(item["messages"] is None for item in report["skipped_at"])
-        yield f"{'at least ' if least else ''}{counted(skipped, 'message')} could not be used", "losses"
-    elif report["skipped_at"]:
-        yield "a recording is damaged, at no cost of messages", "losses"
+    yield from _losses(report)
     for kind, words in (
         (ChangeKind.JUMPED, "the map of {} jumped in its own frame"),
         (ChangeKind.WITHDRAWN, "{} was withdrawn for some time"),
