@@ -148,6 +148,8 @@ class OutputOptions:
         The new MCAP; the recording and the report stand beside it.
     rrd
         Whether the Rerun recording is written.
+    html
+        The report to look at; None: none is written.
     every_ns
         Least time between two merged maps in the MCAP.
     copy_maps
@@ -158,6 +160,7 @@ class OutputOptions:
 
     mcap: Path
     rrd: bool = True
+    html: Path | None = None
     every_ns: int = 0
     copy_maps: bool = False
     force: bool = False

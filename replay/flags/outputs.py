@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from replay.errors import InputError
-from replay.flags.values import mcap_path, read_flag
+from replay.flags.values import html_path, mcap_path, read_flag
 
 if TYPE_CHECKING:
     from replay.options import OutputOptions, RunOptions
@@ -22,6 +22,12 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="OUT.mcap",
         type=Path,
         help="the new MCAP, with OUT.rrd and OUT.json beside it (default: NAME.merged.mcap in the current folder)",
+    )
+    outputs.add_argument(
+        "--report",
+        metavar="OUT.html",
+        type=Path,
+        help="write what came of it as one page to look at in a browser, with pictures and plots; it needs no network",
     )
     outputs.add_argument("--no-rrd", action="store_true", help="write no Rerun recording")
     outputs.add_argument("--force", action="store_true", help="replace outputs that exist")
@@ -52,6 +58,7 @@ def output_options(options: argparse.Namespace, run: RunOptions) -> OutputOption
     return OutputOptions(
         mcap=mcap_path(options.output or Path(f"{stem}.merged.mcap")),
         rrd=not options.no_rrd,
+        html=None if options.report is None else html_path(options.report),
         every_ns=read_flag("--every", options.every, seconds_to_ns),
         copy_maps=options.copy_maps,
         force=options.force,

@@ -24,3 +24,10 @@ def mcap_path(path: Path) -> Path:
     if path.suffix != ".mcap":
         raise UsageError(f"--output {path}: expected a name that ends in .mcap")
     return path
+
+
+def html_path(path: Path) -> Path:
+    """Return the name of a new report to look at, if it is fit for one."""
+    if path.suffix != ".html":
+        raise UsageError(f"--report {path}: expected a name that ends in .html")
+    return path

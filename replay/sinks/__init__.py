@@ -31,6 +31,7 @@ __all__ = [
 SINKS: dict[str, str] = {
     "mcap": "replay.sinks.mcap_file:McapSink",
     "rrd": "replay.sinks.rerun_file:RerunSink",
+    "html": "replay.sinks.html_file:HtmlSink",
     "json": "replay.sinks.json_file:JsonSink",
 }
 """In the order in which they are published: where the last one is, the others are, of the same run."""
@@ -38,7 +39,9 @@ SINKS: dict[str, str] = {
 
 def output_paths(options: OutputOptions) -> dict[str, Path]:
     """Return the file that each sink writes."""
-    return {name: options.mcap.with_suffix(f".{name}") for name in SINKS if name != "rrd" or options.rrd}
+    beside = {name: options.mcap.with_suffix(f".{name}") for name in SINKS if name != "html"}
+    asked = {**beside, "rrd": beside["rrd"] if options.rrd else None, "html": options.html}
+    return {name: path for name in SINKS if (path := asked[name]) is not None}
 
 
 def all_output_paths(options: OutputOptions) -> dict[str, Path]:
@@ -57,7 +60,8 @@ def refuse_existing(options: OutputOptions) -> None:
     # a link that leads nowhere is there, too
     existing = [str(path) for path in all_output_paths(options).values() if os.path.lexists(path)]
     if existing and not options.force:
-        raise UsageError(f"there is already {', '.join(existing)}; give --force to replace, or another --output")
+        names = "another --output" if options.html is None else "another --output and --report"
+        raise UsageError(f"there is already {', '.join(existing)}; give --force to replace, or {names}")
 
 
 @contextmanager

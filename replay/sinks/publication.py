@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
@@ -49,7 +49,7 @@ def publish(written: Sequence[Written], files: Sequence[PartialFile], paths: Seq
     older, new = _OlderFiles(paths), list[Path]()
     try:
         older.set_aside()
-        for path in _published(written, files, paths[0].absolute().parent):
+        for path in _published(written, files):
             new.append(path)
     except BaseException:
         older.put_back(new)
@@ -57,15 +57,21 @@ def publish(written: Sequence[Written], files: Sequence[PartialFile], paths: Seq
     older.remove()
 
 
-def _published(written: Sequence[Written], files: Sequence[PartialFile], folder: Path) -> Iterator[Path]:
+def _published(written: Sequence[Written], files: Sequence[PartialFile]) -> Iterator[Path]:
     """Give each its final name; yield those that have it."""
-    sync_folder(folder)
+    folders = dict.fromkeys(file.path.absolute().parent for file in files)
+    _sync(folders)
     for each, file in zip(written, files, strict=True):
         if each is written[-1]:
-            sync_folder(folder)
+            _sync(folders)
         each.publish()
         yield file.path
-    sync_folder(folder)
+    _sync(folders)
+
+
+def _sync(folders: Iterable[Path]) -> None:
+    for folder in folders:
+        sync_folder(folder)
 
 
 class _OlderFiles:

@@ -19,7 +19,7 @@ from tests.disks import files_up_to
 from tests.scenarios import SCENARIOS, events_of
 
 Opens = Callable[..., Sink]
-TO_THE_BYTE = {"mcap", "json"}
+TO_THE_BYTE = {"mcap", "json", "html"}
 
 
 @pytest.fixture(params=SINKS)
@@ -53,8 +53,15 @@ def files(path: Path) -> list[str]:
 
 
 def test_output_paths_has_every_sink(tmp_path: Path) -> None:
-    assert output_paths(OutputOptions(tmp_path / "a.b.mcap")) == {name: tmp_path / f"a.b.{name}" for name in SINKS}
-    assert set(output_paths(OutputOptions(tmp_path / "a.mcap", rrd=False))) == set(SINKS) - {"rrd"}
+    page = tmp_path / "elsewhere" / "page.html"
+    beside = {name: tmp_path / f"a.b.{name}" for name in SINKS if name != "html"}
+    assert output_paths(OutputOptions(tmp_path / "a.b.mcap", html=page)) == {**beside, "html": page}
+    assert set(output_paths(OutputOptions(tmp_path / "a.mcap"))) == set(SINKS) - {"html"}
+    assert set(output_paths(OutputOptions(tmp_path / "a.mcap", rrd=False, html=page))) == set(SINKS) - {"rrd"}
+
+
+def test_where_the_json_report_is_all_are() -> None:
+    assert list(SINKS)[-1] == "json"
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -184,7 +191,7 @@ class TestErrors:
 class TestTogether:
     @staticmethod
     def outputs(tmp_path: Path) -> OutputOptions:
-        return OutputOptions(tmp_path / "run.mcap")
+        return OutputOptions(tmp_path / "run.mcap", html=tmp_path / "run.html")
 
     def test_all_are_published(self, tmp_path: Path) -> None:
         with open_sinks(self.outputs(tmp_path)) as sinks:

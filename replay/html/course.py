@@ -1,0 +1,127 @@
+"""The course of a run: what each robot's map was at each time, what was decided, and the log of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+from mapmerge.outcome import ChangeKind, Status
+from replay.figures import seconds
+from replay.html.axes import Axis
+from replay.html.plots import Mark, time_axis, time_marks
+from replay.html.robots import STATUS_WORDS
+from replay.html.roster import Member
+from replay.html.story import Decision, Story
+from replay.options import NS_PER_S
+
+MOST_MARKS = 60
+MOST_ENTRIES = 400
+
+SIGNS = {ChangeKind.PLACED: "▲", ChangeKind.MOVED: "◆", ChangeKind.WITHDRAWN: "▼", ChangeKind.JUMPED: "✱"}
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """For how long a robot's map was what: from and to in percent."""
+
+    status: str
+    words: str
+    at: float
+    width: float
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A decision in the course of a run."""
+
+    sign: str
+    kind: str
+    words: str
+    at: float
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """One robot's course."""
+
+    member: Member
+    phases: tuple[Phase, ...]
+    events: tuple[Event, ...]
+
+    @property
+    def summary(self) -> str:
+        """What it shows, in words."""
+        return "; ".join(phase.words for phase in self.phases)
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A line of the log."""
+
+    time: str
+    sign: str
+    kind: str
+    member: Member
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """The course of a run; `left_out` decisions in the middle are not listed."""
+
+    lanes: tuple[Lane, ...]
+    times: tuple[Mark, ...]
+    first: tuple[Entry, ...]
+    last: tuple[Entry, ...]
+    left_out: int
+
+
+def course(story: Story) -> Course | None:
+    """Return the course; None if there was no tick."""
+    if not story.series.ticks:
+        return None
+    over = time_axis(story)
+    lanes = tuple(
+        Lane(member, tuple(_phases(story, member, over)), tuple(_events(story, member, over)))
+        for member in story.roster.values()
+    )
+    entries = [_entry(story, decision) for decision in story.decisions]
+    first, last = (entries, []) if len(entries) <= MOST_ENTRIES else _ends(entries)
+    left_out = story.decisions_left_out + len(entries) - len(first) - len(last)
+    return Course(lanes, time_marks(over), tuple(first), tuple(last), left_out)
+
+
+def _ends(entries: Sequence[Entry]) -> tuple[list[Entry], list[Entry]]:
+    half = MOST_ENTRIES // 2
+    return list(entries[:half]), list(entries[-half:])
+
+
+def _phases(story: Story, member: Member, over: Axis) -> Iterator[Phase]:
+    stamps_ns = story.series.stamps_ns
+    statuses = [sample.status for sample in story.series.of(member.index)]
+    begins = [next(group)[0] for _, group in groupby(enumerate(statuses), key=lambda item: item[1])]
+    for begin, after in zip(begins, [*begins[1:], None], strict=True):
+        since_ns = stamps_ns[begin] - story.first_ns
+        until_ns = (stamps_ns[-1] if after is None else stamps_ns[after]) - story.first_ns
+        at, end = (over.share(each_ns / NS_PER_S) * 100.0 for each_ns in (since_ns, until_ns))
+        if story.first_ns == story.last_ns:
+            end = 100.0
+        words = STATUS_WORDS[Status(statuses[begin])]
+        said = f"{words} from {seconds(since_ns)} to {seconds(until_ns)}"
+        yield Phase(statuses[begin], said, round(at, 2), round(max(0.4, end - at), 2))
+
+
+def _events(story: Story, member: Member, over: Axis) -> Iterator[Event]:
+    own = [decision for decision in story.decisions if decision.robot == member.robot]
+    for decision in own[:MOST_MARKS]:
+        since_ns = decision.stamp_ns - story.first_ns
+        at = round(over.share(since_ns / NS_PER_S) * 100.0, 2)
+        words = f"{decision.kind} at {seconds(since_ns)}"
+        yield Event(SIGNS[ChangeKind(decision.kind)], decision.kind, words, at)
+
+
+def _entry(story: Story, decision: Decision) -> Entry:
+    time = seconds(decision.stamp_ns - story.first_ns)
+    sign = SIGNS[ChangeKind(decision.kind)]
+    return Entry(time, sign, decision.kind, story.member(decision.robot), decision.words)

@@ -1,0 +1,88 @@
+"""The merged map, each robot's walls on it, and the maps that are not merged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mapmerge.overlay import compare, pixels_around, seen, values_on
+from mapmerge.sim2 import IDENTITY
+from mapmerge.warp import Layer
+from replay.html.pictures import Picture, grey_picture, mask_picture, single_picture, tint_picture, visible
+from replay.html.roster import Member
+from replay.html.story import Story
+
+MAX_SIDE_PX = 1600
+_OWN_SIDE_PX = 800
+
+
+@dataclass(frozen=True, slots=True)
+class MapLayer:
+    """A layer of the merged map that can be shown or not."""
+
+    name: str
+    picture: Picture
+    colour: str | None
+    shown: bool
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
+class Stack:
+    """Pictures of the same place on each other."""
+
+    layers: tuple[MapLayer, ...]
+    resolution_m: float
+
+    @property
+    def picture(self) -> Picture:
+        """The lowest one."""
+        return self.layers[0].picture
+
+
+@dataclass(frozen=True, slots=True)
+class Apart:
+    """A robot that is not merged: its own map, if it has one, and why."""
+
+    member: Member
+    picture: Picture | None
+    reason: str
+    code: str
+
+
+def merged_stack(story: Story) -> Stack | None:
+    """Return the merged map and its layers; None without one."""
+    result = story.result
+    if result is None or result.merged is None:
+        return None
+    placed = [
+        (story.member(robot), Layer(result.grids[robot], outcome.merged_from_map))
+        for robot, outcome in result.robots.items()
+        if outcome.merged_from_map is not None and robot in result.grids
+    ]
+    merged = Layer(result.merged, IDENTITY)
+    pixels = pixels_around([merged, *(layer for _, layer in placed)], MAX_SIDE_PX)
+    if pixels is None:
+        return None
+    grey = grey_picture(values_on(merged, pixels, story.cells), pixels)
+    layers = [MapLayer("merged map", grey, None, shown=True, kind="map")]
+    maps = [seen(values_on(layer, pixels, story.cells), story.cells) for _, layer in placed]
+    for (member, _), shown in zip(placed, maps, strict=True):
+        walls = mask_picture([(visible(shown.walls), member.rgb)], pixels)
+        layers.append(MapLayer(member.name, walls, member.colour, shown=True, kind="walls"))
+    if len(maps) > 1:
+        tint = tint_picture(compare(maps, pixels.pixel_m, story.tolerance_m), pixels)
+        layers.append(MapLayer("where maps overlap", tint, None, shown=False, kind="tint"))
+    return Stack(tuple(layers), result.merged.resolution_m)
+
+
+def apart(story: Story) -> list[Apart]:
+    """Return the robots that are not in the merged map."""
+    found = []
+    for robot, values in story.report["robots"].items():
+        if values["merged_from_map"] is not None:
+            continue
+        member = story.member(robot)
+        grid = story.result.grids.get(robot) if story.result else None
+        picture = single_picture(Layer(grid, IDENTITY), member.rgb, story.cells, _OWN_SIDE_PX) if grid else None
+        found.append(Apart(member, picture, values["reason"]["message"], values["reason"]["code"]))
+    return found

@@ -1,0 +1,174 @@
+"""What the outcome is of: inputs, settings, versions, and how to run it again."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from replay.figures import size
+from replay.html.story import Story
+from replay.options import DEFAULT_REORDER_WINDOW_NS, NS_PER_S, RunOptions
+from replay.words import moment
+
+_FLAGS_OF_MERGE = {"merge.method", "merge.scale", "merge.verify.min_confidence"}
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A setting, its value, and what that is by itself where it differs."""
+
+    name: str
+    value: str
+    default: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """A recording that was read."""
+
+    name: str
+    format: str
+    size: str
+    robots: str
+    messages: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """All of it.
+
+    Parameters
+    ----------
+    changed
+        Settings that are not the default ones.
+    settings
+        All settings.
+    command
+        How to run it again; None where that cannot be said.
+    why_not
+        Why it cannot.
+    """
+
+    inputs: tuple[Input, ...]
+    changed: tuple[Setting, ...]
+    settings: tuple[Setting, ...]
+    command: str | None
+    why_not: str
+    version: str
+    first: str
+    last: str
+
+
+def provenance(story: Story) -> Provenance:
+    """Return what a reader needs to have the same again."""
+    report = story.report
+    ours = dict(_flat(RunOptions(()).settings()))
+    settings = tuple(
+        Setting(name, _text(value), None if value == ours.get(name) else _text(ours.get(name)))
+        for name, value in _flat(story.settings)
+    )
+    changed = tuple(item for item in settings if item.default is not None)
+    again, why_not = command(story, [item.name for item in changed])
+    return Provenance(
+        tuple(_input(item) for item in report["inputs"]),
+        changed,
+        settings,
+        again,
+        why_not,
+        report["version"],
+        moment(story.first_ns) if story.series.ticks else "",
+        moment(story.last_ns) if story.series.ticks else "",
+    )
+
+
+def command(story: Story, changed: list[str]) -> tuple[str | None, str]:
+    """Return the command that gives this outcome in the folder of its inputs or, if there is none, why."""
+    if any(name.startswith("merge.") and name not in _FLAGS_OF_MERGE for name in changed):
+        return None, "It was run from Python, with settings that no flag can say: those above that differ."
+    found = shlex.join(["replay", "merge", *_runs(story), *_flags(story)])
+    if not found.isprintable():
+        return None, "A name in it holds characters that cannot be typed."
+    return found, ""
+
+
+def _runs(story: Story) -> Iterator[str]:
+    """Yield the recordings; each as its robot's where several are of one robot each."""
+    names = [str(item["name"]) for item in story.report["inputs"]]
+    of: dict[int, list[str]] = {}
+    for robot in story.robots:
+        for index in robot.inputs:
+            of.setdefault(index, []).append(robot.robot)
+    is_each_of_one = len(names) > 1 and all(len(of.get(index, ())) == 1 for index in range(len(names)))
+    for index, name in enumerate(names):
+        yield f"{of[index][0]}={name}" if is_each_of_one else name
+
+
+def _flags(story: Story) -> Iterator[str]:
+    said = story.settings
+    yield from ("--robots", ",".join(item.robot for item in story.robots))
+    for choice in said["topics"]:
+        yield from ("--topic", f"{choice['robot']}={choice['topic']}" if choice["robot"] else str(choice["topic"]))
+    if said["clock"] != "header":
+        yield from ("--clock", str(said["clock"]))
+    for name in ("start", "stop"):
+        bound = said[name]
+        if bound is not None:
+            yield from (f"--{name}", _seconds(bound["ns"]) if bound["relative"] else f"{bound['ns']}ns")
+    if said["reorder_window_ns"] != DEFAULT_REORDER_WINDOW_NS:
+        yield from ("--reorder-window", _seconds(said["reorder_window_ns"]))
+    if said["align_starts"]:
+        yield "--align-starts"
+    if said["max_memory_bytes"] is not None:
+        yield from ("--max-memory", f"{said['max_memory_bytes']}")
+    yield from _placing_flags(said)
+
+
+def _placing_flags(said: Mapping[str, Any]) -> Iterator[str]:
+    from replay.init_pose import InitPose
+
+    ours = RunOptions(()).merge
+    for pose in said["init_poses"]:
+        yield from ("--init-pose", str(InitPose(**pose)))
+    if said["use_tf"]:
+        yield "--use-tf"
+    merge = said["merge"]
+    for flag, value, default in (
+        ("--method", merge["method"], ours.method),
+        ("--scale", merge["scale"], ours.scale),
+        ("--min-confidence", merge["verify"]["min_confidence"], ours.verify.min_confidence),
+    ):
+        if value != default:
+            yield from (flag, str(value))
+
+
+def _seconds(time_ns: int) -> str:
+    whole, rest = divmod(time_ns, NS_PER_S)
+    return f"{whole}.{rest:09}".rstrip("0").rstrip(".")
+
+
+def _input(item: Mapping[str, Any]) -> Input:
+    return Input(
+        str(item["name"]),
+        str(item["format"]),
+        size(item["size_bytes"]),
+        ", ".join(item["robots"]),
+        int(item["messages"]),
+        str(item["sha256"] or ""),
+    )
+
+
+def _flat(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield settings by their full names."""
+    for name, value in values.items():
+        if isinstance(value, dict) and name not in ("start", "stop"):
+            yield from _flat(value, f"{before}{name}.")
+        else:
+            yield f"{before}{name}", value
+
+
+def _text(value: Any) -> str:  # noqa: ANN401 - any JSON value
+    return json.dumps(value, ensure_ascii=False)
