@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mapmerge.outcome import Pair
+from mapmerge.watch import Trigger
 from replay.events import Report
 from replay.sinks.rerun_text import cell, number, paragraph, table
 
@@ -14,15 +15,13 @@ _COLUMNS = ("", "x, m", "y, m", "yaw, °", "score, m", "as likely as the best")
 _MOST = 12
 
 
-def candidates(report: Report, robot: str, pair: Pair) -> str:
+def candidates(report: Report, pair: Pair) -> str:
     """Return in Markdown what the match of a pair came to: the best placement, and its rivals.
 
     Parameters
     ----------
     report
         As of now.
-    robot
-        Whose match it is.
     pair
         Its robots, target first.
     """
@@ -43,7 +42,7 @@ def candidates(report: Report, robot: str, pair: Pair) -> str:
     where = f"Where the map frame of {source} lies in that of {target}"
     parts.append(f"{where}; a rival is another placement that was compared with the best one.")
     if match["searched"] is not None:
-        parts.append(f"Searched as {cell(match['searched']['trigger'])}; shown for {cell(robot)}.")
+        parts.append(f"It was searched last as {Trigger(match['searched']['trigger']).words}.")
     return "\n\n".join(part for part in parts if part) + "\n"
 
 

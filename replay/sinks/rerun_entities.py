@@ -30,10 +30,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from replay.palette import Rgb, robot_colour
 from replay.plain_text import escaped, plain
 
 EntityPath = list[str]
-Rgb = tuple[int, int, int]
 
 MERGED: EntityPath = ["merged"]
 MERGED_MAP: EntityPath = ["merged", "map"]
@@ -48,18 +48,6 @@ ROBOTS: EntityPath = ["robots"]
 SKIPPED: EntityPath = ["skipped"]
 ABOUT: EntityPath = ["about"]
 
-# Bright enough for a dark ground, and told apart by those who see red and green alike. Green and red say whether maps
-# agree, and grey is kept for limits.
-_PALETTE: tuple[tuple[str, Rgb], ...] = (
-    ("blue", (77, 163, 255)),
-    ("orange", (255, 159, 64)),
-    ("violet", (196, 132, 255)),
-    ("yellow", (240, 222, 90)),
-    ("cyan", (84, 222, 228)),
-    ("pink", (255, 128, 190)),
-    ("brown", (190, 140, 100)),
-    ("white", (235, 238, 242)),
-)
 LIMIT_COLOUR: Rgb = (150, 150, 150)
 GROUND: Rgb = (23, 23, 23)
 """What lies behind the maps, and of a map what it does not know."""
@@ -81,12 +69,12 @@ class RobotEntities:
     @property
     def colour(self) -> Rgb:
         """Colour of the robot; the palette repeats when there are many."""
-        return _PALETTE[self.index % len(_PALETTE)][1]
+        return robot_colour(self.index).bright
 
     @property
     def colour_name(self) -> str:
         """What the colour is called."""
-        return _PALETTE[self.index % len(_PALETTE)][0]
+        return robot_colour(self.index).name
 
     @property
     def part(self) -> str:

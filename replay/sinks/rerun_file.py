@@ -144,7 +144,7 @@ class _Writer:
         for robot in self._steps:
             pair = event.result.robots[robot].shown_pair
             if pair is not None:
-                self._show_page(self._robots[robot].candidates, candidates(event.report, robot, pair))
+                self._show_page(self._robots[robot].candidates, candidates(event.report, pair))
 
     def _show_pages(self, report: Report) -> None:
         robots, since_s = list(self._robots.values()), self._since_ns / NS_PER_S

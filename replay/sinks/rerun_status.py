@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import rerun as rr
 
 from replay.events import Report
-from replay.sinks.rerun_entities import Rgb, RobotEntities
+from replay.palette import Rgb
+from replay.sinks.rerun_entities import RobotEntities
 from replay.sinks.rerun_stream import RrdStream
 
 _STATES: tuple[tuple[str, str, Rgb], ...] = (
