@@ -76,7 +76,7 @@ def _merged(extent: Box | None, robots: int, span_ns: int) -> Part:
     words = rrb.Vertical(
         rrb.TextDocumentView(name="Outcome", origin=_path(SUMMARY)),
         rrb.TextDocumentView(name="How to read the map", origin=_path(LEGEND)),
-        row_shares=[7, 3],
+        row_shares=[3, 1],
     )
     strips = rrb.StateTimelineView(name="What each robot is", origin=_path(STATUS), time_view=_time_axis(span_ns, 0.0))
     share = _STRIP_SHARE * (1 + min(robots, _MOST_STRIPS))

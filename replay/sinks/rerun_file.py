@@ -23,6 +23,7 @@ from replay.sinks.rerun_candidates import candidates
 from replay.sinks.rerun_entities import ABOUT, DECISIONS, LEGEND, ROBOTS, SKIPPED, SUMMARY, EntityPath, RobotEntities
 from replay.sinks.rerun_errors import rerun_errors
 from replay.sinks.rerun_maps import MapScene
+from replay.sinks.rerun_overlap import OverlapScene
 from replay.sinks.rerun_plots import Plots
 from replay.sinks.rerun_status import Statuses
 from replay.sinks.rerun_stream import RrdStream
@@ -76,7 +77,9 @@ class _Writer:
         robots = [RobotEntities(item.robot, index) for index, item in enumerate(started.robots)]
         self.stream = stream
         self._robots = {entities.robot: entities for entities in robots}
-        self._maps = MapScene(self.stream, robots, CellConfig(**merge["cells"]))
+        cells = CellConfig(**merge["cells"])
+        self._maps = MapScene(self.stream, robots, cells)
+        self._overlap = OverlapScene(self.stream, cells, merge["verify"]["tolerance_m"])
         limit_of = "confidence" if merge["method"] in CALIBRATED else "acceptance"
         self._plots = Plots(self.stream, robots, limit_of, merge["verify"][f"min_{limit_of}"])
         self._statuses = Statuses(self.stream, robots)
@@ -117,6 +120,7 @@ class _Writer:
         self._start_ns = event.stamp_ns if self._start_ns is None else self._start_ns
         self._stamp_ns = event.stamp_ns
         self._maps.show(event.result)
+        self._overlap.show(event.result)
         for item in event.pictures:
             self._show_picture(item)
         self._show_candidates(event)

@@ -13,8 +13,7 @@ from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
 from mapmerge.merger import MergeResult
 from mapmerge.outcome import RobotOutcome, Status
-from mapmerge.plane import Box
-from mapmerge.resample import at_resolution
+from mapmerge.resample import in_bands
 from mapmerge.sim2 import Points, Sim2
 from mapmerge.warp import Bytes
 from replay.sinks.rerun_entities import GROUND, MERGED, MERGED_MAP, EntityPath, RobotEntities
@@ -26,7 +25,6 @@ from replay.sinks.rerun_walls import WallScene
 
 # A texture of a graphics card has at most so many pixels on a side; larger maps are shown coarser.
 MAX_SIDE_CELLS = 8192
-_BAND_CELLS = 256
 
 # Of cells that are free, as likely free as occupied, and occupied.
 _FLOOR, _UNSURE, _WALL = 84, 50, 170
@@ -176,16 +174,9 @@ def _label(robot: str, outcome: RobotOutcome) -> str:
 
 
 def _shrunk(grid: Grid, cells: CellConfig) -> Grid:
-    """Return a map so coarse that it can be shown; it is pooled band by band, so that memory is that of a band."""
+    """Return a map so coarse that it can be shown."""
     factor = math.ceil(max(grid.cells.shape) / MAX_SIDE_CELLS)
-    if factor == 1:
-        return grid
-    resolution_m, whole = grid.resolution_m * factor, Box(0, 0, *grid.cells.shape)
-    parts = [
-        at_resolution(Grid(grid.cells[band.slices(whole)], grid.resolution_m), resolution_m, cells).cells
-        for band in whole.bands(_BAND_CELLS * factor)
-    ]
-    return Grid(np.concatenate(parts), resolution_m, grid.map_from_grid, is_own=True)
+    return grid if factor == 1 else in_bands(grid, factor, cells)
 
 
 def _corners_m(grid: Grid) -> Points:

@@ -182,6 +182,18 @@ def test_maps_are_those_of_the_result(recording: Path, story: list[Event]) -> No
     assert sum(len(row["Points3D:positions"] or ()) for row in tiles) == np.count_nonzero(known.cells >= 65)
 
 
+def test_the_overlap_is_tinted_while_maps_are_placed(recording: Path, story: list[Event]) -> None:
+    entity = Entity(recording, "/merged/overlap")
+    assert entity.stamps == [STAMPS[index] for index in (2, 4, 5)]
+    assert entity.rows[1].get("Clear:is_recursive") == [False]
+    shape = entity.rows[2]["GridMap:format"][0]
+    pixels = np.array(entity.rows[2]["GridMap:data"][0], np.uint8).reshape(shape["height"], shape["width"], 4)
+    green = (pixels[..., 1] > pixels[..., 0]) & (pixels[..., 3] > 0)
+    last = next(event for event in reversed(story) if isinstance(event, Merged))
+    area_m2 = green.sum() * entity.rows[2]["GridMap:cell_size"][0] ** 2
+    assert area_m2 == pytest.approx(last.result.robots["r2"].agreement.overlap_m2, rel=0.2)
+
+
 def test_a_placed_map_is_under_its_placement(recording: Path) -> None:
     row = Entity(recording, "/merged/robots/r2").rows[-1]
     true = reference_from("r2")
