@@ -8,21 +8,34 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.drawing import AGREE, BANNER_PX, INK, MARK, MAX_SIDE_PX, PAPER, Colour, Rgb, text, titled
+from mapmerge.drawing import (
+    AGREE,
+    BANNER_PX,
+    INK,
+    LABEL_PX,
+    MARK,
+    MAX_SIDE_PX,
+    PAPER,
+    Colour,
+    Label,
+    Named,
+    Rgb,
+    text,
+    titled,
+    width_px,
+)
 from mapmerge.evidence import CurvesEvidence, Evidence, ImagesEvidence, OverlayEvidence, SurfaceEvidence
 from mapmerge.prepared import CELL_FREE, CELL_UNKNOWN, MEETS_WALL, PreparedMap
 from mapmerge.render_images import side_by_side
 from mapmerge.sim2 import Points, Sim2
 
-__all__ = ["MAX_SIDE_PX", "Picture", "Rgb", "render"]
+__all__ = ["MAX_SIDE_PX", "Label", "Named", "Picture", "Rgb", "render"]
 
 _FAINT: Colour = (222, 222, 222)
-_SERIES: tuple[Colour, ...] = ((31, 119, 180), (255, 127, 14), (44, 160, 44), (148, 103, 189))
+_SERIES: tuple[Colour, ...] = ((148, 103, 189), (140, 86, 75), (44, 160, 44), (23, 160, 180))
 _UNKNOWN: Colour = (205, 205, 205)
 _FREE_ONE: Colour = (238, 238, 238)
 _FREE_BOTH: Colour = (255, 255, 255)
-_WALL_TARGET: Colour = (70, 110, 180)
-_WALL_SOURCE: Colour = (225, 150, 50)
 _DISAGREE: Colour = (220, 30, 40)
 
 
@@ -45,42 +58,64 @@ class Picture:
     rgb: Rgb
 
 
-def render(evidence: Evidence) -> Picture:
-    """Return a picture of what a matcher saw in one step."""
+def render(evidence: Evidence, named: Named | None = None) -> Picture:
+    """Return a picture of what a matcher saw in one step.
+
+    Parameters
+    ----------
+    evidence
+        What it saw.
+    named
+        What the maps are called; ``target`` and ``source`` by default.
+    """
+    named = named or Named()
     match evidence:
         case CurvesEvidence():
-            rgb = _curves(evidence)
+            rgb = _curves(evidence, named)
         case SurfaceEvidence():
             rgb = _surface(evidence)
         case OverlayEvidence():
-            rgb = _overlay(evidence)
+            rgb = _overlay(evidence, named)
         case ImagesEvidence():
-            rgb = side_by_side(evidence)
+            rgb = side_by_side(evidence, named)
     return Picture(evidence.step, evidence.title, rgb)
 
 
-def _curves(evidence: CurvesEvidence) -> Rgb:
+def _curves(evidence: CurvesEvidence, named: Named) -> Rgb:
     """One panel for each curve, over a common axis."""
-    width, panel, left, right, top = 960, 170, 24, 936, 40
-    height = top + panel * len(evidence.curves) + 46
+    width, panel, left, right = 960, 200, 24, 936
+    height = panel * len(evidence.curves) + 76
     image = np.full((height, width, 3), 255, np.uint8)
-    text(image, evidence.title, (left, 26), 0.6)
     span = evidence.stop - evidence.start
 
     def x_px(abscissa: float) -> int:
         return left + round((abscissa - evidence.start) / span * (right - left))
 
     for index, curve in enumerate(evidence.curves):
-        low, high = top + panel * (index + 1) - 12, top + panel * index + 18
+        low, high = panel * (index + 1) - 12, panel * index + 40
         for mark in evidence.marks:
-            cv2.line(image, (x_px(mark), high), (x_px(mark), low), _FAINT if index < 2 else MARK, 1)
+            cv2.line(image, (x_px(mark), high), (x_px(mark), low), _FAINT if index < 2 else MARK, 2)
         cv2.line(image, (left, low), (right, low), INK, 1)
-        _polyline(image, curve.values, (left, right), (low, high), _SERIES[index % len(_SERIES)])
-        text(image, curve.label, (left + 6, high + 8), 0.5, _SERIES[index % len(_SERIES)])
+        label = named.label(curve.label) or Label(curve.label, _SERIES[index % len(_SERIES)])
+        _polyline(image, curve.values, (left, right), (low, high), label.colour)
+        at = right - width_px(label.words, LABEL_PX) - 6, high - 12
+        text(image, label.words, at, LABEL_PX, label.colour)
     for tick in np.linspace(evidence.start, evidence.stop, 7):
-        text(image, f"{tick:g}", (x_px(float(tick)) - 10, height - 26), 0.45)
-    text(image, evidence.axis, (width // 2 - 40, height - 8), 0.5)
-    return image
+        words = f"{tick:g}"
+        at_px = min(max(2, x_px(float(tick)) - width_px(words, LABEL_PX) // 2), width - width_px(words, LABEL_PX) - 2)
+        text(image, words, (at_px, height - 42), LABEL_PX)
+    text(image, evidence.axis, ((width - width_px(evidence.axis, LABEL_PX)) // 2, height - 10), LABEL_PX)
+    labels = [Label("followed", MARK)] if evidence.marks else []
+    return _fitted(titled(image, evidence.title, labels))
+
+
+def _fitted(image: Rgb) -> Rgb:
+    """Return a picture that is no larger than it may be."""
+    zoom = MAX_SIDE_PX / max(image.shape[:2])
+    if zoom >= 1.0:
+        return image
+    size = max(1, int(image.shape[1] * zoom)), max(1, int(image.shape[0] * zoom))
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _polyline(
@@ -105,10 +140,12 @@ def _surface(evidence: SurfaceEvidence) -> Rgb:
     grey = cv2.resize(scaled.astype(np.uint8)[::-1], size, interpolation=interpolation)
     image: Rgb = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_VIRIDIS)[:, :, ::-1], np.uint8)
     for row, col in evidence.marks:
-        _circle(image, _pixel(row, col, values.shape, zoom), 9, PAPER, 1)
+        _circle(image, _pixel(row, col, values.shape, zoom), 14, PAPER, 2)
+    labels = [Label("other candidates", PAPER)] if evidence.marks else []
     if evidence.chosen is not None:
-        _circle(image, _pixel(*evidence.chosen, values.shape, zoom), 14, MARK, 3)
-    return titled(image, evidence.title)
+        _circle(image, _pixel(*evidence.chosen, values.shape, zoom), 20, MARK, 4)
+        labels.append(Label("chosen", MARK))
+    return titled(image, evidence.title, labels)
 
 
 def _circle(image: Rgb, at: tuple[int, int], radius_px: int, colour: Colour, thickness_px: int) -> None:
@@ -123,7 +160,7 @@ def _pixel(row: int, col: int, shape: tuple[int, ...], zoom: float) -> tuple[int
     return int((col + 0.5) * zoom), int((shape[0] - row - 0.5) * zoom)
 
 
-def _overlay(evidence: OverlayEvidence) -> Rgb:
+def _overlay(evidence: OverlayEvidence, named: Named) -> Rgb:
     """Both maps in the target's grid frame, seen from above with y upwards."""
     target, source, pose = evidence.target, evidence.source, evidence.target_from_source
     corners = np.concatenate([_corners(target), pose.apply(_corners(source))])
@@ -136,8 +173,8 @@ def _overlay(evidence: OverlayEvidence) -> Rgb:
     agree, disagree = [], []
     walls_m = pose.apply(source.wall_cells_m)
     for here, walls, there, at in (
-        (target, walls_m, _WALL_SOURCE, walls_m),
-        (source, back.apply(target.wall_cells_m), _WALL_TARGET, target.wall_cells_m),
+        (target, walls_m, named.source.colour, walls_m),
+        (source, back.apply(target.wall_cells_m), named.target.colour, target.wall_cells_m),
     ):
         index = here.flat_index(walls)
         matched = (here.meets.ravel()[index] & MEETS_WALL) > 0
@@ -147,7 +184,8 @@ def _overlay(evidence: OverlayEvidence) -> Rgb:
         disagree.append(at[violated])
     _dots(image, np.concatenate(agree), low, pixel_m, AGREE)
     _dots(image, np.concatenate(disagree), low, pixel_m, _DISAGREE)
-    return titled(image, evidence.title)
+    labels = named.target, named.source, Label("agree", AGREE), Label("contradict", _DISAGREE)
+    return titled(image, evidence.title, labels)
 
 
 def _corners(prepared: PreparedMap) -> Points:

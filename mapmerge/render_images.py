@@ -7,12 +7,25 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from mapmerge.drawing import AGREE, BANNER_PX, INK, MARK, MAX_SIDE_PX, Colour, Rgb, text, titled
+from mapmerge.drawing import (
+    AGREE,
+    BANNER_PX,
+    INK,
+    LABEL_PX,
+    MARK,
+    MAX_SIDE_PX,
+    Colour,
+    Label,
+    Named,
+    Rgb,
+    text,
+    titled,
+)
 from mapmerge.evidence import ImagesEvidence, MarkedImage
 from mapmerge.sim2 import Points
 
 _GAP_PX = 8
-_LABEL_PX = 22
+_LABEL_PX = 34
 _MAX_ZOOM = 8.0
 _MANY_MARKS = 150
 _BEHIND: Colour = (232, 232, 232)
@@ -35,7 +48,7 @@ class _Panel:
         return np.stack([x, y], axis=1)
 
 
-def side_by_side(evidence: ImagesEvidence) -> Rgb:
+def side_by_side(evidence: ImagesEvidence, named: Named) -> Rgb:
     """Return both images, seen with y upwards, beside or above each other, whichever shows them larger."""
     images = evidence.target, evidence.source
     panels = max((_laid_out(images, beside=True), _laid_out(images, beside=False)), key=_smaller_zoom)
@@ -43,7 +56,7 @@ def side_by_side(evidence: ImagesEvidence) -> Rgb:
     height = max(panel.top + panel.height for panel in panels)
     picture = np.full((height, width, 3), _BEHIND, np.uint8)
     for image, panel in zip(images, panels, strict=True):
-        _paste(picture, image, panel)
+        _paste(picture, image, panel, named)
     ones, others = (
         panel.place(image.marks, image.pixels.shape[0]) for image, panel in zip(images, panels, strict=True)
     )
@@ -78,8 +91,9 @@ def _laid_out(images: tuple[MarkedImage, MarkedImage], *, beside: bool) -> tuple
     return first, _Panel(0, 2 * _LABEL_PX + shown[0][1] + _GAP_PX, *shown[1], zooms[1])
 
 
-def _paste(picture: Rgb, image: MarkedImage, panel: _Panel) -> None:
-    text(picture, image.label, (panel.left + 4, panel.top - 6), 0.5, INK)
+def _paste(picture: Rgb, image: MarkedImage, panel: _Panel, named: Named) -> None:
+    label = named.label(image.label) or Label(image.label, INK)
+    text(picture, label.words, (panel.left + 6, panel.top - 9), LABEL_PX, label.colour, weight=600)
     if image.pixels.size == 0:
         return
     interpolation = cv2.INTER_AREA if panel.zoom < 1 else cv2.INTER_NEAREST

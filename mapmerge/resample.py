@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from mapmerge.config import CellConfig
 from mapmerge.grid import UNKNOWN, Cells, Grid
+from mapmerge.plane import Box
 
 _SAME = 1e-6
+_BAND_CELLS = 256
 
 
 def at_resolution(grid: Grid, resolution_m: float, config: CellConfig) -> Grid:
@@ -26,6 +28,16 @@ def at_resolution(grid: Grid, resolution_m: float, config: CellConfig) -> Grid:
         return Grid(grid.cells, resolution_m, grid.map_from_grid, is_own=True)
     cells = _pooled(grid.cells, ratio, config) if ratio > 1.0 else _repeated(grid.cells, ratio)
     return Grid(cells, resolution_m, grid.map_from_grid, is_own=True)
+
+
+def in_bands(grid: Grid, factor: int, config: CellConfig) -> Grid:
+    """Return the map so many times as coarse, as `at_resolution` does, in the memory of a part of it."""
+    whole, resolution_m = Box(0, 0, *grid.cells.shape), grid.resolution_m * factor
+    parts = [
+        at_resolution(Grid(grid.cells[band.slices(whole)], grid.resolution_m), resolution_m, config).cells
+        for band in whole.bands(_BAND_CELLS * factor)
+    ]
+    return Grid(np.concatenate(parts), resolution_m, grid.map_from_grid, is_own=True)
 
 
 def _starts(count: int, ratio: float) -> NDArray[np.intp]:

@@ -7,9 +7,11 @@ from collections.abc import Callable, Iterable
 from mapmerge.evidence import Evidence
 from mapmerge.merger import MergeResult
 from mapmerge.outcome import Pair
-from mapmerge.render import render
+from mapmerge.render import Label, Named, render
 from replay.events import RobotPicture
 from replay.options import ImageChoice
+from replay.palette import robot_colour
+from replay.plain_text import brief
 
 
 class Gallery:
@@ -33,11 +35,13 @@ class Gallery:
         if self._choice == "none":
             return ()
         pictures: list[RobotPicture] = []
+        labels = {robot: Label(brief(robot), robot_colour(index).ink) for index, robot in enumerate(result.robots)}
         for robot, outcome in result.robots.items():
             pair = outcome.shown_pair
             if pair is None:
                 continue
             if self._choice == "all" or pair in result.searched or self._shown.get(robot) != pair:
                 self._shown[robot] = pair
-                pictures.extend(RobotPicture(robot, render(evidence)) for evidence in self._explain(pair))
+                named = Named(*(labels[name] for name in pair))
+                pictures.extend(RobotPicture(robot, render(evidence, named)) for evidence in self._explain(pair))
         return tuple(pictures)

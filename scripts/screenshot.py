@@ -89,6 +89,39 @@ def show(client: ViewerClient, recording: Path, time_fraction: float | None = No
     time.sleep(_SETTLE_S)
 
 
+def show_tab(client: ViewerClient, name: str) -> None:
+    """Bring a tab to the front, and those within tabs that hold it.
+
+    Raises
+    ------
+    LookupError
+        If there is no tab of this name.
+    """
+    found = client.get_blueprint()
+    layout = found.blueprint
+    parents = {child: path for path, parts in layout.items() for child in _contents(parts)}
+    for path, parts in layout.items():
+        names = {own.get("display_name") for own in parts.values()}
+        if name not in names or path not in parents:
+            continue
+        while path in parents:
+            container = layout[parents[path]]["ContainerBlueprint"]
+            if container["container_kind"] == "Tabs":
+                container["active_tab"] = path
+            path = parents[path]  # noqa: PLW2901
+        client.set_blueprint(layout, store_id=found.store_id)
+        time.sleep(_SETTLE_S)
+        return
+    raise LookupError(f"there is no tab {name!r}")
+
+
+def _contents(parts: dict[str, dict[str, object]]) -> list[str]:
+    """Return what a container holds; of one thing alone, it stands there by itself."""
+    held = parts.get("ContainerBlueprint", {}).get("contents", [])
+    found = [held] if isinstance(held, str) else held if isinstance(held, list) else []
+    return [f"/{str(each).lstrip('/')}" for each in found]
+
+
 def complaints(client: ViewerClient) -> list[str]:
     """Return the warnings and errors of the views that are shown."""
     return [
@@ -104,12 +137,15 @@ def main() -> int:
     parser.add_argument("recording", type=Path, metavar="RUN.rrd")
     parser.add_argument("picture", type=Path, metavar="OUT.png")
     parser.add_argument("--time-fraction", type=float, help="0 for the start to 1 for the end; default: as it opens")
+    parser.add_argument("--tab", help="which tab is shown (default: the one that it opens on)")
     parser.add_argument("--size", default="1400x900", help="of the window (default: %(default)s)")
     arguments = parser.parse_args()
     if not arguments.recording.is_file():
         parser.error(f"{arguments.recording}: there is no such file")
     with viewer(arguments.size) as client:
         show(client, arguments.recording, arguments.time_fraction)
+        if arguments.tab:
+            show_tab(client, arguments.tab)
         time.sleep(_NOTICES_S)  # until the viewer's own notices are gone
         client.save_screenshot(str(arguments.picture.resolve()))
         found = complaints(client)

@@ -80,7 +80,7 @@ def _surface(pair: PairOfMaps, best: Sim2, rivals: list[Sim2], config: SearchCon
 def _overlay(pair: PairOfMaps, best: Sim2, config: MergeConfig) -> Evidence:
     seen = OverlayEvidence(
         step="overlay",
-        title="Walls that agree are green, walls in the other map's free space red",
+        title="Both maps at the best placement: walls that agree, walls in the other's free space",
         target=pair.target.map,
         source=pair.source.map,
         target_from_source=best,

@@ -37,7 +37,7 @@ class Member:
     @property
     def rgb(self) -> Rgb:
         """Its colour."""
-        return robot_colour(self.index)
+        return robot_colour(self.index).ink
 
     @property
     def colour(self) -> str:

@@ -1,4 +1,4 @@
-"""What the Rerun viewer shows when the recording is opened: the final state, from above."""
+"""What the Rerun viewer shows when the recording is opened: four tabs, the first one with the outcome."""
 
 from __future__ import annotations
 
@@ -7,19 +7,35 @@ from collections.abc import Mapping, Sequence
 import rerun as rr
 import rerun.blueprint as rrb
 
-from replay.sinks.rerun_entities import ABOUT, DECISIONS, MERGED, PLOTS, ROBOTS, EntityPath, RobotEntities
+from replay.sinks.rerun_entities import (
+    ABOUT,
+    DECISIONS,
+    GROUND,
+    LEGEND,
+    MERGED,
+    PLOTS,
+    ROBOTS,
+    SKIPPED,
+    STATUS,
+    SUMMARY,
+    EntityPath,
+    RobotEntities,
+)
 from replay.sinks.rerun_layout import Box, eye
-from replay.sinks.rerun_plots import STEP_TIME, TITLES
-from replay.sinks.rerun_stream import TIMELINE
+from replay.sinks.rerun_plots import POSE, STEP_TIME, TITLES
+from replay.sinks.rerun_stream import ELAPSED
 
 Part = rrb.Container | rrb.View
-Span = tuple[int, int]
 
 _LEGEND_SHARE = 0.25
+_FIGURES = ("acceptance", "confidence", "overlap_m2", "overlap_fraction")
+_MOST_ACROSS = 3
+_STRIP_SHARE = 0.06
+_MOST_STRIPS = 5
 
 
 def blueprint(
-    robots: Sequence[RobotEntities], steps: Mapping[str, Sequence[str]], extent: Box | None, span: Span | None
+    robots: Sequence[RobotEntities], steps: Mapping[str, Sequence[str]], extent: Box | None, span_ns: int
 ) -> rrb.Blueprint:
     """Return the layout of the viewer.
 
@@ -31,17 +47,13 @@ def blueprint(
         Steps of which there are pictures, for each robot that has any.
     extent
         What the maps cover in the end.
-    span
-        First and last time.
+    span_ns
+        From the first tick to the last one.
     """
-    left = rrb.Vertical(_maps(extent), _words(), row_shares=[3, 1])
-    pictured = [entities for entities in robots if steps.get(entities.robot)]
-    pictures = [rrb.Tabs(*(_pictures(item, steps[item.robot]) for item in pictured))] if pictured else []
-    plots = _tabs(("acceptance", "confidence"), span), _tabs(("overlap_m2", "overlap_fraction", STEP_TIME), span)
-    right = rrb.Vertical(*pictures, *plots, row_shares=[5] * len(pictures) + [4, 4])
+    tabs = [_merged(extent, len(robots), span_ns), *_method(robots, steps), _over_time(span_ns), _decisions()]
     return rrb.Blueprint(
-        rrb.Horizontal(left, right, column_shares=[11, 9]),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),
+        rrb.Tabs(*tabs, active_tab=0),
+        rrb.TimePanel(state="collapsed", timeline=ELAPSED, play_state="following"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         auto_layout=False,
@@ -49,53 +61,84 @@ def blueprint(
     )
 
 
-def _maps(extent: Box | None) -> rrb.View:
+def _merged(extent: Box | None, robots: int, span_ns: int) -> Part:
     controls = None
     if extent is not None:
         position, target = eye(extent)
         controls = rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 1.0, 0.0))
-    return rrb.Spatial3DView(name="Maps", origin=_path(MERGED), eye_controls=controls, line_grid=False)
-
-
-def _words() -> Part:
-    columns = rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
-    return rrb.Tabs(
-        rrb.TextLogView(name="Decisions", origin=_path(DECISIONS), columns=columns),
-        rrb.TextDocumentView(name="Robots", origin=_path(ROBOTS)),
-        rrb.TextDocumentView(name="About", origin=_path(ABOUT)),
+    maps = rrb.Spatial3DView(
+        name="Maps",
+        origin=_path(MERGED),
+        eye_controls=controls,
+        background=rrb.Background(color=GROUND),
+        line_grid=False,
+    )
+    words = rrb.Vertical(
+        rrb.TextDocumentView(name="Outcome", origin=_path(SUMMARY)),
+        rrb.TextDocumentView(name="How to read the map", origin=_path(LEGEND)),
+        row_shares=[3, 1],
+    )
+    strips = rrb.StateTimelineView(name="What each robot is", origin=_path(STATUS), time_view=_time_axis(span_ns, 0.0))
+    share = _STRIP_SHARE * (1 + min(robots, _MOST_STRIPS))
+    return rrb.Vertical(
+        rrb.Horizontal(maps, words, column_shares=[62, 38]), strips, row_shares=[1.0 - share, share], name="Merged"
     )
 
 
-def _pictures(entities: RobotEntities, steps: Sequence[str]) -> Part:
-    """Show the last step large, as it is the outcome, and those before it beside it."""
-    views = [rrb.Spatial2DView(name=step.replace("_", " "), origin=_path([*entities.evidence, step])) for step in steps]
-    name = f"Match of {entities.label_text}"
-    if len(views) == 1:
-        return rrb.Vertical(*views, name=name)
-    before = rrb.Grid(*views[:-1], grid_columns=1 + (len(views) - 1) // 4)
-    return rrb.Horizontal(views[-1], before, column_shares=[1, 1], name=name)
+def _method(robots: Sequence[RobotEntities], steps: Mapping[str, Sequence[str]]) -> list[Part]:
+    """Show for each robot the steps of the method in order, and what came of them; nothing without pictures."""
+    pictured = [_matched(item, steps[item.robot]) for item in robots if steps.get(item.robot)]
+    return [rrb.Tabs(*pictured, name="Method")] if pictured else []
 
 
-def _plot(quantity: str, span: Span | None) -> rrb.View:
+def _matched(entities: RobotEntities, steps: Sequence[str]) -> Part:
+    views = [rrb.Spatial2DView(name=_title(step), origin=_path([*entities.evidence, step])) for step in steps]
+    found = rrb.TextDocumentView(name="Candidates", origin=_path(entities.candidates))
+    if len(views) <= _MOST_ACROSS:
+        return rrb.Vertical(rrb.Horizontal(*views), found, row_shares=[3, 2], name=entities.label_text)
+    grid = rrb.Grid(*views, grid_columns=_MOST_ACROSS)
+    return rrb.Horizontal(grid, found, column_shares=[7, 3], name=entities.label_text)
+
+
+def _title(step: str) -> str:
+    return step.replace("_", " ").capitalize()
+
+
+def _over_time(span_ns: int) -> Part:
+    plots = [_plot([*PLOTS, quantity], TITLES[quantity], span_ns) for quantity in _FIGURES]
+    plots += [_plot([*PLOTS, "pose", part], TITLES[part], span_ns) for part in POSE]
+    plots.append(_plot([*PLOTS, STEP_TIME], TITLES[STEP_TIME], span_ns))
+    return rrb.Grid(*plots, grid_columns=4, name="Over time")
+
+
+def _plot(path: EntityPath, title: str, span_ns: int) -> rrb.View:
     return rrb.TimeSeriesView(
-        name=TITLES[quantity],
-        origin=_path([*PLOTS, quantity]),
-        axis_x=_time_axis(span),
-        plot_legend=rrb.Corner2D.RightBottom,
+        name=title, origin=_path(path), axis_x=_time_axis(span_ns, _LEGEND_SHARE), plot_legend=rrb.Corner2D.RightBottom
     )
 
 
-def _tabs(quantities: Sequence[str], span: Span | None) -> Part:
-    return rrb.Tabs(*(_plot(quantity, span) for quantity in quantities))
-
-
-def _time_axis(span: Span | None) -> rrb.TimeAxis | None:
-    """Show the whole run, with room for the legend at its right; without this, a minute around the cursor is shown."""
-    if span is None or span[0] == span[1]:
+def _time_axis(span_ns: int, more: float) -> rrb.TimeAxis | None:
+    """Show the whole run and more, as where legends are; without this, a minute around the cursor is shown."""
+    if span_ns == 0:
         return None
-    stop_ns = span[1] + int((span[1] - span[0]) * _LEGEND_SHARE)
     boundary = rr.TimeRangeBoundary.absolute
-    return rrb.TimeAxis(view_range=rrb.TimeRange(boundary(nanos=span[0]), boundary(nanos=stop_ns)))
+    return rrb.TimeAxis(view_range=rrb.TimeRange(boundary(nanos=0), boundary(nanos=span_ns + int(span_ns * more))))
+
+
+def _decisions() -> Part:
+    # The column of times is too narrow for a time, and is in its own units: entries begin with theirs.
+    columns = rrb.TextLogColumns(timeline_columns=[], text_log_columns=["LogLevel", "Body"])
+    return rrb.Vertical(
+        rrb.TextLogView(name="What was decided, and why", origin=_path(DECISIONS), columns=columns),
+        rrb.Horizontal(
+            rrb.TextDocumentView(name="Robots", origin=_path(ROBOTS)),
+            rrb.TextDocumentView(name="Skipped", origin=_path(SKIPPED)),
+            rrb.TextDocumentView(name="Inputs and settings", origin=_path(ABOUT)),
+            column_shares=[5, 4, 4],
+        ),
+        row_shares=[1, 1],
+        name="Decisions",
+    )
 
 
 def _path(parts: EntityPath) -> str:

@@ -4,17 +4,25 @@
 
     merged                          the merged frame
     ├── map                         the merged map
+    ├── overlap                     where several maps agree, and where they contradict each other
     ├── robots/<robot>              merged_from_map or, of a map that is not placed, where it is parked
     │   ├── map                     the robot's own map
     │   ├── walls/<tile>            its occupied cells in the robot's colour
-    │   └── outline                 the box of what it knows
+    │   ├── path/<piece>            where it drove, in pieces
+    │   └── position                where it is
     └── labels/<robot>              its name; of a map that is not placed, also why
+    summary                         what is merged, how sure that is and what went wrong, as of now
+    legend                          what the colours of the map mean
+    status/<robot>                  what becomes of it over time
     evidence/<robot>/<step>         pictures of the match that placed the robot, or of its best refused one
+    evidence/<robot>/candidates     the placements that this match found, with their scores
     plots/<quantity>/placed|refused/<robot>
-    plots/acceptance/limit          least acceptance index
+    plots/<quantity>/limit          the least that is accepted
+    plots/pose/x|y|yaw/<robot>      where it is placed
     plots/step_ms/merge|render      wall time of each step
     decisions                       what jumped, was placed, moved, withdrawn or skipped, and why
     robots                          the table of robots as of now
+    skipped                         messages and parts of recordings that were not used
     about                           inputs and settings
 """
 
@@ -22,31 +30,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from replay.palette import Rgb, robot_colour
 from replay.plain_text import escaped, plain
 
 EntityPath = list[str]
-Rgb = tuple[int, int, int]
 
 MERGED: EntityPath = ["merged"]
 MERGED_MAP: EntityPath = ["merged", "map"]
+OVERLAP: EntityPath = ["merged", "overlap"]
+SUMMARY: EntityPath = ["summary"]
+LEGEND: EntityPath = ["legend"]
+STATUS: EntityPath = ["status"]
 EVIDENCE: EntityPath = ["evidence"]
 PLOTS: EntityPath = ["plots"]
 DECISIONS: EntityPath = ["decisions"]
 ROBOTS: EntityPath = ["robots"]
+SKIPPED: EntityPath = ["skipped"]
 ABOUT: EntityPath = ["about"]
 
-# Dark enough for white floors, bright enough for a dark screen; red and grey are kept for warnings and limits.
-_PALETTE: tuple[Rgb, ...] = (
-    (36, 113, 204),
-    (240, 120, 10),
-    (20, 155, 75),
-    (165, 70, 200),
-    (190, 140, 0),
-    (0, 160, 175),
-    (225, 75, 145),
-    (125, 95, 60),
-)
 LIMIT_COLOUR: Rgb = (150, 150, 150)
+GROUND: Rgb = (23, 23, 23)
+"""What lies behind the maps, and of a map what it does not know."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,13 +69,12 @@ class RobotEntities:
     @property
     def colour(self) -> Rgb:
         """Colour of the robot; the palette repeats when there are many."""
-        return _PALETTE[self.index % len(_PALETTE)]
+        return robot_colour(self.index).bright
 
     @property
-    def text_colour(self) -> Rgb:
-        """The same, bright enough for text on a dark ground."""
-        red, green, blue = ((part + 255) // 2 for part in self.colour)
-        return red, green, blue
+    def colour_name(self) -> str:
+        """What the colour is called."""
+        return robot_colour(self.index).name
 
     @property
     def part(self) -> str:
@@ -98,10 +101,14 @@ class RobotEntities:
         """Parent of its occupied cells, which are logged tile by tile."""
         return [*self.frame, "walls"]
 
+    def path(self, piece: int) -> EntityPath:
+        """Return where a piece of the way that it drove is."""
+        return [*self.frame, "path", str(piece)]
+
     @property
-    def outline(self) -> EntityPath:
-        """The box of what it knows."""
-        return [*self.frame, "outline"]
+    def position(self) -> EntityPath:
+        """Where it is."""
+        return [*self.frame, "position"]
 
     @property
     def label(self) -> EntityPath:
@@ -113,6 +120,20 @@ class RobotEntities:
         """Parent of its pictures."""
         return [*EVIDENCE, self.part]
 
+    @property
+    def candidates(self) -> EntityPath:
+        """The placements that its match found."""
+        return [*self.evidence, "candidates"]
+
+    @property
+    def status(self) -> EntityPath:
+        """What becomes of it over time."""
+        return [*STATUS, self.part]
+
     def plot(self, quantity: str, *, placed: bool) -> EntityPath:
         """Its line while it is placed, or the points of its best refused candidates."""
         return [*PLOTS, quantity, "placed" if placed else "refused", self.part]
+
+    def pose_plot(self, part: str) -> EntityPath:
+        """Its line of where it is placed: x, y or yaw."""
+        return [*PLOTS, "pose", part, self.part]

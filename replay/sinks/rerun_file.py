@@ -18,12 +18,17 @@ from replay.options import NS_PER_S, OutputOptions
 from replay.plain_text import plain
 from replay.sinks import rerun_text as text
 from replay.sinks.partial_file import PartialFile
-from replay.sinks.rerun_blueprint import Span, blueprint
-from replay.sinks.rerun_entities import ABOUT, DECISIONS, ROBOTS, RobotEntities
+from replay.sinks.rerun_blueprint import blueprint
+from replay.sinks.rerun_candidates import candidates
+from replay.sinks.rerun_entities import ABOUT, DECISIONS, LEGEND, ROBOTS, SKIPPED, SUMMARY, EntityPath, RobotEntities
 from replay.sinks.rerun_errors import rerun_errors
 from replay.sinks.rerun_maps import MapScene
+from replay.sinks.rerun_overlap import OverlapScene
 from replay.sinks.rerun_plots import Plots
+from replay.sinks.rerun_status import Statuses
 from replay.sinks.rerun_stream import RrdStream
+from replay.sinks.rerun_summary import LEGEND as LEGEND_TEXT
+from replay.sinks.rerun_summary import Said, summary
 
 _MARKDOWN = rr.MediaType.MARKDOWN
 
@@ -72,13 +77,19 @@ class _Writer:
         robots = [RobotEntities(item.robot, index) for index, item in enumerate(started.robots)]
         self.stream = stream
         self._robots = {entities.robot: entities for entities in robots}
-        self._maps = MapScene(self.stream, robots, CellConfig(**merge["cells"]))
+        cells = CellConfig(**merge["cells"])
+        self._maps = MapScene(self.stream, robots, cells)
+        self._overlap = OverlapScene(self.stream, cells, merge["verify"]["tolerance_m"])
         limit_of = "confidence" if merge["method"] in CALIBRATED else "acceptance"
         self._plots = Plots(self.stream, robots, limit_of, merge["verify"][f"min_{limit_of}"])
+        self._statuses = Statuses(self.stream, robots)
         self._steps: dict[str, list[str]] = {}
         self._waiting: list[Entry] = []
-        self._table = ""
-        self._span: Span | None = None
+        self._said: list[Said] = []
+        self._pages: dict[tuple[str, ...], str] = {}
+        self._start_ns: int | None = None
+        self._stamp_ns = 0
+        self.stream.log(LEGEND, rr.TextDocument(LEGEND_TEXT, media_type=_MARKDOWN), static=True)
 
     def take(self, event: Event) -> None:
         """Log an event."""
@@ -95,26 +106,36 @@ class _Writer:
 
     def finish(self) -> None:
         """Write the layout of the viewer and all that makes the file whole."""
-        self.stream.send(blueprint(list(self._robots.values()), self._steps, self._maps.extent, self._span))
+        robots = list(self._robots.values())
+        self.stream.send(blueprint(robots, self._steps, self._maps.extent, self._since_ns))
         self.stream.finish()
+
+    @property
+    def _since_ns(self) -> int:
+        """How long after the first tick it is; 0 without any."""
+        return 0 if self._start_ns is None else self._stamp_ns - self._start_ns
 
     def _take_merged(self, event: Merged) -> None:
         self.stream.at(event.stamp_ns)
-        self._span = (self._span[0] if self._span else event.stamp_ns, event.stamp_ns)
+        self._start_ns = event.stamp_ns if self._start_ns is None else self._start_ns
+        self._stamp_ns = event.stamp_ns
         self._maps.show(event.result)
+        self._overlap.show(event.result)
         for item in event.pictures:
             self._show_picture(item)
+        self._show_candidates(event)
         self._plots.show(event.report, event.timing)
+        self._statuses.show(event.report)
         self._say_waiting()
         for entry in decisions(event.result):
             self._say(entry)
-        self._show_table(event.report)
+        self._show_pages(event.report)
 
     def _take_finished(self, event: Finished) -> None:
         self._say_waiting()
         for entry in text.outcome(event.report):
             self._say(entry)
-        self._show_table(event.report)
+        self._show_pages(event.report)
         self.stream.log(ABOUT, rr.TextDocument(text.about(event.report), media_type=_MARKDOWN), static=True)
 
     def _show_picture(self, item: RobotPicture) -> None:
@@ -123,11 +144,23 @@ class _Writer:
             steps.append(item.picture.step)
         self.stream.log([*self._robots[item.robot].evidence, item.picture.step], rr.Image(item.picture.rgb))
 
-    def _show_table(self, report: Report) -> None:
-        table = text.robots_table(report)
-        if table != self._table:
-            self._table = table
-            self.stream.log(ROBOTS, rr.TextDocument(table, media_type=_MARKDOWN), static=self._span is None)
+    def _show_candidates(self, event: Merged) -> None:
+        for robot in self._steps:
+            pair = event.result.robots[robot].shown_pair
+            if pair is not None:
+                self._show_page(self._robots[robot].candidates, candidates(event.report, pair))
+
+    def _show_pages(self, report: Report) -> None:
+        robots, since_s = list(self._robots.values()), self._since_ns / NS_PER_S
+        self._show_page(SUMMARY, summary(report, robots, self._said, None if self._start_ns is None else since_s))
+        self._show_page(ROBOTS, text.robots_table(report))
+        self._show_page(SKIPPED, text.skipped_table(report))
+
+    def _show_page(self, path: EntityPath, page: str) -> None:
+        """Log a page, if it differs from the one before."""
+        if self._pages.get(tuple(path)) != page:
+            self._pages[tuple(path)] = page
+            self.stream.log(path, rr.TextDocument(page, media_type=_MARKDOWN), static=self._start_ns is None)
 
     def _say_waiting(self) -> None:
         for entry in self._waiting:
@@ -136,11 +169,10 @@ class _Writer:
 
     def _say(self, entry: Entry) -> None:
         level, words = entry[0], plain(entry[1])
-        if self._span is None:
-            self.stream.log(DECISIONS, rr.TextLog(words, level=level), static=True)
-            return
-        since_s = (self._span[1] - self._span[0]) / NS_PER_S
-        self.stream.log(DECISIONS, rr.TextLog(f"+{since_s:.1f} s  {words}", level=level))
+        said = Said(self._since_ns / NS_PER_S, level, words)
+        self._said.append(said)
+        line = words if self._start_ns is None else f"{said.since}  {words}"
+        self.stream.log(DECISIONS, rr.TextLog(line, level=level), static=self._start_ns is None)
 
 
 def _recording_id(started: Started) -> UUID:

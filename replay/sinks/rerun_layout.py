@@ -10,17 +10,15 @@ import numpy as np
 
 from mapmerge.merger import MergeResult
 from mapmerge.sim2 import Points, Sim2
+from replay.sinks.rerun_labels import PointM, label_places_m
 
 _LEAST_GAP_M = 2.0
 _GAP_SHARE = 0.08
 _LABEL_GAP_SHARE = 0.2
-_MARGIN = 1.08
+_MARGIN = 1.06
 _EYE_FIELD_RAD = math.radians(55.0)
-_EYE_ASPECT = 1.25
+_EYE_ASPECT = 1.3
 _LABEL_SHARE = 0.08
-
-
-PointM = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +71,7 @@ class Layout:
     extent: Box | None
 
 
-def lay_out(result: MergeResult, corners_m: Mapping[str, Points]) -> Layout:
+def lay_out(result: MergeResult, corners_m: Mapping[str, Points], places_m: Mapping[str, Points]) -> Layout:
     """Place all maps.
 
     Maps that fit each other, but not the reference's, are parked together, as they fit.
@@ -84,6 +82,8 @@ def lay_out(result: MergeResult, corners_m: Mapping[str, Points]) -> Layout:
         What is known of the robots.
     corners_m
         Corners of what each map knows, in its map frame, for those that know anything.
+    places_m
+        What each of these maps knows, in its map frame: see `replay.sinks.rerun_labels.known_places_m`.
     """
     shown: dict[str, Sim2] = {}
     parked: dict[str, dict[str, Sim2]] = {}
@@ -94,22 +94,13 @@ def lay_out(result: MergeResult, corners_m: Mapping[str, Points]) -> Layout:
             shown[robot] = outcome.merged_from_map
         elif outcome.placement is not None:
             parked.setdefault(outcome.placement.component, {})[robot] = outcome.placement.component_from_map
-    labels_m = {
-        robot: _corner_m(shown[robot], corners_m[robot], index)
-        for index, robot in enumerate(result.robots)
-        if robot in shown
-    }
+    labels_m = label_places_m(shown, places_m)
     base = _covered(shown, corners_m)
     for poses in _park(base, parked, corners_m):
         shown.update(poses)
         labels_m.update(_below(poses, corners_m))
     ordered = {robot: shown[robot] for robot in result.robots if robot in shown}
     return Layout(ordered, labels_m, _covered(ordered, corners_m))
-
-
-def _corner_m(pose: Sim2, corners_m: Points, index: int) -> PointM:
-    """Return a corner of a placed map, of each robot another, so that labels do not lie on each other."""
-    return pose.apply_point(*(float(part) for part in corners_m[index % len(corners_m)]))
 
 
 def _below(poses: Mapping[str, Sim2], corners_m: Mapping[str, Points]) -> dict[str, PointM]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,28 +13,33 @@ from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
 from mapmerge.merger import MergeResult
 from mapmerge.outcome import RobotOutcome, Status
-from mapmerge.plane import Box
-from mapmerge.resample import at_resolution
+from mapmerge.resample import in_bands
 from mapmerge.sim2 import Points, Sim2
-from replay.plain_text import plain
-from replay.sinks.rerun_entities import MERGED, MERGED_MAP, EntityPath, RobotEntities
+from mapmerge.warp import Bytes
+from replay.sinks.rerun_entities import GROUND, MERGED, MERGED_MAP, EntityPath, RobotEntities
+from replay.sinks.rerun_labels import PointM, known_places_m
 from replay.sinks.rerun_layout import Box as Extent
-from replay.sinks.rerun_layout import Layout, PointM, lay_out
+from replay.sinks.rerun_layout import Layout, lay_out
 from replay.sinks.rerun_stream import RrdStream
 from replay.sinks.rerun_walls import WallScene
 
 # A texture of a graphics card has at most so many pixels on a side; larger maps are shown coarser.
 MAX_SIDE_CELLS = 8192
-_BAND_CELLS = 256
 
-# Heights in metres above the merged map, of which what lies on it is seen from above.
-_OUTLINE_Z_M = 0.02
-_LABEL_Z_M = 0.5
+# Of cells that are free, as likely free as occupied, and occupied.
+_FLOOR, _UNSURE, _WALL = 84, 50, 170
 
+_LABEL_Z_M = 1.0
 # In points of the screen, which the library tells from metres by their sign.
-_OUTLINE_RADIUS = rr.Radius.ui_points(0.75)
+_DOT_RADIUS = rr.Radius.ui_points(0.75)
 
-_LABEL_WIDTH = 34
+
+def _shades() -> Bytes:
+    """Return the shade of each cell's byte: floors dim, walls light, what is not known as the ground behind the map."""
+    percent = np.arange(101)
+    shades = np.full(256, GROUND[0], np.uint8)
+    shades[:101] = np.interp(percent, (0, 50, 100), (_FLOOR, _UNSURE, _WALL)).astype(np.uint8)
+    return shades
 
 
 @dataclass(slots=True)
@@ -43,6 +47,7 @@ class _Shown:
     """What the recording shows of one robot now."""
 
     corners_m: Points | None = None
+    places_m: Points | None = None
     pose: Sim2 | None = None
     label: tuple[str, PointM] | None = None
 
@@ -64,6 +69,7 @@ class MapScene:
         self._stream = stream
         self._robots = robots
         self._cells = cells
+        self._shades = _shades()
         self._merged: Grid | None = None
         self._shown = {entities.robot: _Shown() for entities in robots}
         self._walls = {entities.robot: WallScene(stream, entities, cells) for entities in robots}
@@ -82,7 +88,8 @@ class MapScene:
             if entities.robot in result.updated:
                 self._show_map(entities, result.grids[entities.robot])
         corners_m = {robot: shown.corners_m for robot, shown in self._shown.items() if shown.corners_m is not None}
-        layout = lay_out(result, corners_m)
+        places_m = {robot: shown.places_m for robot, shown in self._shown.items() if shown.places_m is not None}
+        layout = lay_out(result, corners_m, places_m)
         self._extent = layout.extent
         for entities in self._robots:
             self._show_pose(entities, layout)
@@ -99,24 +106,9 @@ class MapScene:
         shown = self._shown[entities.robot]
         self._log_grid(entities.map, known, draw_order=0.0)
         self._walls[entities.robot].show(known)
-        if known.cells.size == 0:
-            shown.corners_m = None
-            self._stream.log(entities.outline, rr.Clear(recursive=False))
-            return
-        corners_m = _corners_m(known)
-        if shown.corners_m is None or not np.array_equal(shown.corners_m, corners_m):
-            self._log_outline(entities, corners_m)
-        shown.corners_m = corners_m
-
-    def _log_outline(self, entities: RobotEntities, corners_m: Points) -> None:
-        self._stream.log(
-            entities.outline,
-            rr.LineStrips3D(
-                [_raised(np.vstack([corners_m, corners_m[:1]]), _OUTLINE_Z_M)],
-                radii=_OUTLINE_RADIUS,
-                colors=[entities.colour],
-            ),
-        )
+        is_blank = known.cells.size == 0
+        shown.corners_m = None if is_blank else _corners_m(known)
+        shown.places_m = None if is_blank else known_places_m(known)
 
     def _log_grid(self, path: EntityPath, grid: Grid, *, draw_order: float) -> None:
         if grid.cells.size == 0:
@@ -128,7 +120,7 @@ class MapScene:
             path,
             rr.GridMap(
                 # Row 0 has the lowest y in a map, and is the top one in a picture.
-                data=shown.cells[::-1].tobytes(),
+                data=self._shades[shown.cells.view(np.uint8)[::-1]].tobytes(),
                 format=rr.components.ImageFormat(
                     width=shown.cols, height=shown.rows, color_model="L", channel_datatype="U8"
                 ),
@@ -136,7 +128,7 @@ class MapScene:
                 translation=[pose.x_m, pose.y_m, 0.0],
                 quaternion=_quaternion(pose.yaw_rad),
                 draw_order=draw_order,
-                colormap=rr.components.Colormap.RvizMap,
+                colormap=rr.components.Colormap.Grayscale,
             ),
         )
 
@@ -169,8 +161,8 @@ class MapScene:
                 [[*at_m, _LABEL_Z_M]],
                 labels=[text],
                 show_labels=True,
-                colors=[entities.text_colour],
-                radii=_OUTLINE_RADIUS,
+                colors=[entities.colour],
+                radii=_DOT_RADIUS,
             ),
         )
 
@@ -178,32 +170,19 @@ class MapScene:
 def _label(robot: str, outcome: RobotOutcome) -> str:
     if outcome.merged_from_map is not None:
         return f"{robot} (reference)" if outcome.status is Status.REFERENCE else robot
-    lines = textwrap.wrap(plain(outcome.reason.message), _LABEL_WIDTH)
-    return "\n".join([f"{robot} is not merged:", *lines])
+    return f"{robot}: not merged,\n{outcome.reason.code.replace('_', ' ')}"
 
 
 def _shrunk(grid: Grid, cells: CellConfig) -> Grid:
-    """Return a map so coarse that it can be shown; it is pooled band by band, so that memory is that of a band."""
+    """Return a map so coarse that it can be shown."""
     factor = math.ceil(max(grid.cells.shape) / MAX_SIDE_CELLS)
-    if factor == 1:
-        return grid
-    resolution_m, whole = grid.resolution_m * factor, Box(0, 0, *grid.cells.shape)
-    parts = [
-        at_resolution(Grid(grid.cells[band.slices(whole)], grid.resolution_m), resolution_m, cells).cells
-        for band in whole.bands(_BAND_CELLS * factor)
-    ]
-    return Grid(np.concatenate(parts), resolution_m, grid.map_from_grid, is_own=True)
+    return grid if factor == 1 else in_bands(grid, factor, cells)
 
 
 def _corners_m(grid: Grid) -> Points:
     """Return the corners of a grid in the map frame, counter-clockwise from that of cell (0, 0)."""
     width_m, height_m = grid.cols * grid.resolution_m, grid.rows * grid.resolution_m
     return grid.map_from_grid.apply(np.array([[0.0, 0.0], [width_m, 0.0], [width_m, height_m], [0.0, height_m]]))
-
-
-def _raised(points_m: Points, height_m: float) -> Points:
-    """Return points of the plane at a height above it."""
-    return np.column_stack([points_m, np.full(len(points_m), height_m)])
 
 
 def _quaternion(yaw_rad: float) -> rr.Quaternion:

@@ -20,12 +20,20 @@ TITLES: Mapping[str, str] = {
     "confidence": "Confidence",
     "overlap_m2": "Overlap, m²",
     "overlap_fraction": "Overlap, share",
-    STEP_TIME: "Wall time per step, ms",
+    "x": "Placed at x, m",
+    "y": "Placed at y, m",
+    "yaw": "Placed at yaw, °",
+    STEP_TIME: "Wall time per update, ms",
 }
+POSE = ("x", "y", "yaw")
+"""Parts of where a map is placed that are plotted."""
 
 _REFERENCE_WIDTH = 4.0
 _WIDTH = 2.0
-_STEPS: tuple[tuple[str, tuple[int, int, int]], ...] = (("merge", (36, 113, 204)), ("render", (240, 120, 10)))
+_STEPS: tuple[tuple[str, tuple[int, int, int]], ...] = (
+    ("merge", (77, 163, 255)),
+    ("render", (255, 159, 64)),
+)
 
 
 class Plots:
@@ -53,6 +61,8 @@ class Plots:
         for entities in robots:
             for quantity in QUANTITIES:
                 self._style(entities, quantity)
+            for part in POSE if entities.index else ():
+                stream.log(entities.pose_plot(part), self._line(entities, _WIDTH), static=True)
         line = rr.SeriesLines(colors=[LIMIT_COLOUR], widths=[1.0], names=["least accepted"])
         stream.log(self._limit_path, line, static=True)
         for name, colour in _STEPS:
@@ -65,6 +75,8 @@ class Plots:
             values = report["robots"][entities.robot]
             for quantity in QUANTITIES:
                 self._show_value(entities, quantity, values)
+            if entities.index:
+                self._show_pose(entities, values["merged_from_map"])
         self._stream.log(self._limit_path, rr.Scalars(self._limit))
         for (name, _), seconds in zip(_STEPS, (timing.merge_s, timing.render_s), strict=True):
             self._stream.log([*PLOTS, STEP_TIME, name], rr.Scalars(seconds * 1000.0))
@@ -72,14 +84,26 @@ class Plots:
     def _style(self, entities: RobotEntities, quantity: str) -> None:
         # The reference agrees with the others as they do with it: its line is wide, so that theirs are seen on it.
         width = _WIDTH if entities.index else _REFERENCE_WIDTH
-        line = rr.SeriesLines(
-            colors=[entities.colour], widths=[width], names=[entities.label_text], interpolation_mode="StepAfter"
-        )
-        self._stream.log(entities.plot(quantity, placed=True), line, static=True)
+        self._stream.log(entities.plot(quantity, placed=True), self._line(entities, width), static=True)
         points = rr.SeriesPoints(
             colors=[entities.colour], markers=["cross"], marker_sizes=[4.0], names=[f"{entities.label_text}, refused"]
         )
         self._stream.log(entities.plot(quantity, placed=False), points, static=True)
+
+    @staticmethod
+    def _line(entities: RobotEntities, width: float) -> rr.SeriesLines:
+        names, colours = [entities.label_text], [entities.colour]
+        return rr.SeriesLines(colors=colours, widths=[width], names=names, interpolation_mode="StepAfter")
+
+    def _show_pose(self, entities: RobotEntities, pose: Mapping[str, float] | None) -> None:
+        """Log where a map is placed; the reference lies at the origin of its own frame, and is not plotted."""
+        line = (entities.robot, "pose")
+        if pose is None and line not in self._drawn:
+            return
+        values = (pose["x_m"], pose["y_m"], math.degrees(pose["yaw_rad"])) if pose else (math.nan,) * len(POSE)
+        (self._drawn.add if pose else self._drawn.remove)(line)
+        for part, value in zip(POSE, values, strict=True):
+            self._stream.log(entities.pose_plot(part), rr.Scalars(value))
 
     def _show_value(self, entities: RobotEntities, quantity: str, values: Mapping[str, Any]) -> None:
         value, placed = values[quantity], values["merged_from_map"] is not None

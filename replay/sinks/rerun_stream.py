@@ -20,6 +20,8 @@ from replay.sinks.rerun_outlet import outlet_to
 APPLICATION = "replay"
 TIMELINE = "log_time"
 """Time of the recording."""
+ELAPSED = "elapsed"
+"""The same since the first tick, which is what people ask for."""
 TICKS = "tick"
 """Number of the time, from 0: to step from one to the next, and to compare two files by, since ``rerun rrd compare``
 leaves out whatever is called log_time."""
@@ -63,6 +65,7 @@ class RrdStream:
         self._recording.set_log_time_enabled(False)
         self._recording.set_log_tick_enabled(False)
         self._ticks = 0
+        self._start_ns: int | None = None
         self._waiting_bytes = 0
         self._broken = False
         self._outlet = outlet_to(file)
@@ -75,7 +78,9 @@ class RrdStream:
 
     def at(self, stamp_ns: int) -> None:
         """Set the time of what is logged from now on."""
+        self._start_ns = stamp_ns if self._start_ns is None else self._start_ns
         self._recording.set_time(TIMELINE, timestamp=np.datetime64(stamp_ns, "ns"))
+        self._recording.set_time(ELAPSED, duration=np.timedelta64(stamp_ns - self._start_ns, "ns"))
         self._recording.set_time(TICKS, sequence=self._ticks)
         self._ticks += 1
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from replay.decisions import INFO, WARN, Entry
@@ -12,7 +13,8 @@ from replay.events import Noted, Report, Skipped
 from replay.plain_text import plain, plain_json
 from replay.words import lost
 
-_COLUMNS = ("robot", "status", "x, m", "y, m", "yaw, °", "acceptance", "overlap, m²", "confidence", "reason")
+_MARKS = re.compile(r"[\\`*_\[\]<>#]")
+_COLUMNS = ("robot", "status", "x, m", "y, m", "yaw, °", "acceptance", "overlap, m²", "confidence")
 
 
 def skipped(event: Skipped) -> Entry:
@@ -39,10 +41,23 @@ def outcome(report: Report) -> Iterator[Entry]:
 
 
 def robots_table(report: Report) -> str:
-    """Return the robots as a table in Markdown."""
-    rows = [_COLUMNS, ("---",) * len(_COLUMNS)]
-    rows += [_row(robot, values) for robot, values in report["robots"].items()]
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+    """Return the robots as a table in Markdown, and why each is where it is."""
+    robots = report["robots"].items()
+    reasons = [f"- **{cell(robot)}**: {paragraph(values['reason']['message'])}" for robot, values in robots]
+    return "\n\n".join([table(_COLUMNS, [_row(robot, values) for robot, values in robots]), "\n".join(reasons)]) + "\n"
+
+
+def skipped_table(report: Report) -> str:
+    """Return what was not used as a table in Markdown."""
+    places = report["skipped_at"]
+    if not places:
+        return "Nothing was skipped: all messages with maps were used.\n"
+    rows = [
+        (cell(item["cause"]), _count(item["messages"]), cell(item["topic"] or item["place"]), cell(item["input"]))
+        for item in places
+    ]
+    details = [f"- {cell(item['topic'] or item['place'])}: {paragraph(item['detail'])}" for item in places]
+    return "\n\n".join([table(("cause", "messages", "where", "input"), rows), "\n".join(details)]) + "\n"
 
 
 def about(report: Report) -> str:
@@ -57,25 +72,39 @@ def _row(robot: str, values: Mapping[str, Any]) -> tuple[str, ...]:
     pose = values["merged_from_map"] or {}
     yaw_rad = pose.get("yaw_rad")
     return (
-        _plain(robot),
-        _plain(values["status"]),
-        _number(pose.get("x_m"), 2),
-        _number(pose.get("y_m"), 2),
-        _number(None if yaw_rad is None else math.degrees(yaw_rad), 1),
-        _number(values["acceptance"], 3),
-        _number(values["overlap_m2"], 1),
-        _number(values["confidence"], 4),
-        _plain(values["reason"]["message"]),
+        cell(robot),
+        cell(values["status"]),
+        number(pose.get("x_m"), 2),
+        number(pose.get("y_m"), 2),
+        number(None if yaw_rad is None else math.degrees(yaw_rad), 1),
+        number(values["acceptance"], 3),
+        number(values["overlap_m2"], 1),
+        number(values["confidence"], 4),
     )
 
 
-def _number(value: float | None, digits: int) -> str:
+def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table in Markdown, of text that stays in its cells."""
+    return "\n".join("| " + " | ".join(row) + " |" for row in (columns, ("---",) * len(columns), *rows))
+
+
+def number(value: float | None, digits: int) -> str:
+    """Return a number with so many digits after its point, or nothing."""
     return "" if value is None else f"{value:.{digits}f}"
 
 
-def _plain(text: str) -> str:
-    """Return text that stays in its cell."""
-    return plain(text).replace("|", "\\|").replace("_", "\\_").replace("\n", " ")
+def cell(text: str) -> str:
+    """Return text that stays in its cell of a table."""
+    return paragraph(text).replace("|", "\\|")
+
+
+def paragraph(text: str) -> str:
+    """Return text that is read as it is, and on one line."""
+    return _MARKS.sub(r"\\\g<0>", plain(text).replace("\n", " "))
+
+
+def _count(messages: int | None) -> str:
+    return "?" if messages is None else str(messages)
 
 
 def _block(value: Any) -> str:  # noqa: ANN401 - any JSON value

@@ -163,7 +163,10 @@ def test_errors_say_which_setting_and_what_was_expected(replay: Program, tmp_pat
         (("--set", "merge.verify.min_overlap=2"), "--set merge.verify.min_overlap: there is no such setting; did you"),
         (("--set", "time.start=noon"), "--set time.start: 'noon' is no time"),
         (("--config", str(SAMPLE)), f"{SAMPLE}: it holds no /merged/report"),
-        (("--config", str(ROOT / "docs/report.schema.json")), f"{ROOT / 'docs/report.schema.json'}: this is JSON of something else"),
+        (
+            ("--config", str(ROOT / "docs/report.schema.json")),
+            f"{ROOT / 'docs/report.schema.json'}: this is JSON of something else",
+        ),
     ],
 )
 def test_files_that_are_none(replay: Program, arguments: tuple[str, ...], error: str) -> None:

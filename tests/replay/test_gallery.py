@@ -65,6 +65,6 @@ def test_each_is_rendered_once(monkeypatch: pytest.MonkeyPatch) -> None:
     def blank(step_name: str) -> Picture:
         return Picture(step_name, "nothing", np.zeros((2, 2, 3), np.uint8))
 
-    monkeypatch.setattr("replay.gallery.render", lambda evidence: rendered.append(evidence) or blank(evidence.step))
+    monkeypatch.setattr("replay.gallery.render", lambda evidence, _: rendered.append(evidence) or blank(evidence.step))
     shown("changed")
     assert len(rendered) == 3 * len(STEPS)

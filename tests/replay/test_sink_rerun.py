@@ -27,7 +27,9 @@ from replay.gallery import Gallery
 from replay.options import OutputOptions, RunOptions
 from replay.report import ReportBuilder
 from replay.sinks.partial_file import PartialFile
+from replay.sinks.rerun_entities import GROUND
 from replay.sinks.rerun_file import RerunSink
+from replay.sinks.rerun_labels import label_places_m
 from replay.sinks.rerun_layout import Box, lay_out
 from replay.sinks.rerun_maps import MAX_SIDE_CELLS
 from replay.sinks.rerun_stream import RrdStream
@@ -120,15 +122,15 @@ class Entity:
 
 def _rows(batch: pa.RecordBatch) -> list[dict[str, Any]]:
     columns = {name: batch.column(name) for name in batch.schema.names}
-    if "log_time" in columns:
-        columns["log_time"] = columns["log_time"].cast(pa.int64())
+    for timeline in {"log_time", "elapsed"} & set(columns):
+        columns[timeline] = columns[timeline].cast(pa.int64())
     return [{name: column[index].as_py() for name, column in columns.items()} for index in range(batch.num_rows)]
 
 
-def grid_of(row: Mapping[str, Any]) -> np.ndarray:
-    """Return the cells of a logged map, row 0 with the lowest y again."""
+def shades_of(row: Mapping[str, Any]) -> np.ndarray:
+    """Return the shades of a logged map, row 0 with the lowest y again."""
     shape = row["GridMap:format"][0]
-    return np.array(row["GridMap:data"][0], np.uint8).view(np.int8).reshape(shape["height"], shape["width"])[::-1]
+    return np.array(row["GridMap:data"][0], np.uint8).reshape(shape["height"], shape["width"])[::-1]
 
 
 # What is there, and when
@@ -137,18 +139,19 @@ def grid_of(row: Mapping[str, Any]) -> np.ndarray:
 def test_the_entities_are_those_of_the_documented_tree(recording: Path) -> None:
     found = {chunk.entity_path for chunk in RrdReader(recording).stream()}
     for robot in ("r1", "r2", STRANGER_PATH):
-        assert {f"/merged/robots/{robot}{part}" for part in ("", "/map", "/outline")} <= found
+        assert {f"/merged/robots/{robot}{part}" for part in ("", "/map")} <= found
         assert any(path.startswith(f"/merged/robots/{robot}/walls/") for path in found)
         assert f"/merged/labels/{robot}" in found
     assert {"/merged/map", "/decisions", "/robots", "/about", "/plots/step_ms/merge"} <= found
+    assert {"/summary", "/legend", "/skipped", "/status/r2", "/plots/pose/yaw/r2", "/evidence/r2/candidates"} <= found
     assert {f"/evidence/r2/{name}" for name in ("overlay", "orientation_spectra", "correlation_surface")} <= found
-    assert not any("r4" in path for path in found if not path.startswith("/plots"))
+    assert not any("r4" in path for path in found if not path.startswith(("/plots", "/status")))
 
 
 def test_all_times_are_those_of_the_ticks(recording: Path) -> None:
     stamps: set[int] = set()
     for chunk in RrdReader(recording).stream():
-        assert chunk.is_static or set(chunk.timeline_names) == {"log_time", "tick"}
+        assert chunk.is_static or set(chunk.timeline_names) == {"log_time", "elapsed", "tick"}
         if not chunk.is_static:
             stamps |= {row["log_time"] for row in _rows(chunk.to_record_batch())}
     assert stamps == set(STAMPS)
@@ -166,7 +169,10 @@ def test_maps_are_those_of_the_result(recording: Path, story: list[Event]) -> No
     known = last.result.grids["r2"].cropped_to_known()
     for path, grid in (("/merged/map", last.result.merged), ("/merged/robots/r2/map", known)):
         row = Entity(recording, path).rows[-1]
-        assert np.array_equal(grid_of(row), grid.cells)
+        shades = shades_of(row)
+        assert shades.shape == grid.cells.shape
+        assert np.array_equal(shades == GROUND[0], grid.cells < 0)
+        assert np.array_equal(shades > 100, grid.cells >= 65)
         pose = grid.map_from_grid
         assert row["GridMap:translation"][0] == pytest.approx([pose.x_m, pose.y_m, 0.0])
         assert row["GridMap:quaternion"][0] == pytest.approx([0, 0, np.sin(pose.yaw_rad / 2), np.cos(pose.yaw_rad / 2)])
@@ -174,6 +180,18 @@ def test_maps_are_those_of_the_result(recording: Path, story: list[Event]) -> No
     paths = {chunk.entity_path for chunk in RrdReader(recording).stream()}
     tiles = [Entity(recording, path).rows[-1] for path in paths if path.startswith("/merged/robots/r2/walls/")]
     assert sum(len(row["Points3D:positions"] or ()) for row in tiles) == np.count_nonzero(known.cells >= 65)
+
+
+def test_the_overlap_is_tinted_while_maps_are_placed(recording: Path, story: list[Event]) -> None:
+    entity = Entity(recording, "/merged/overlap")
+    assert entity.stamps == [STAMPS[index] for index in (2, 4, 5)]
+    assert entity.rows[1].get("Clear:is_recursive") == [False]
+    shape = entity.rows[2]["GridMap:format"][0]
+    pixels = np.array(entity.rows[2]["GridMap:data"][0], np.uint8).reshape(shape["height"], shape["width"], 4)
+    green = (pixels[..., 1] > pixels[..., 0]) & (pixels[..., 3] > 0)
+    last = next(event for event in reversed(story) if isinstance(event, Merged))
+    area_m2 = green.sum() * entity.rows[2]["GridMap:cell_size"][0] ** 2
+    assert area_m2 == pytest.approx(last.result.robots["r2"].agreement.overlap_m2, rel=0.2)
 
 
 def test_a_placed_map_is_under_its_placement(recording: Path) -> None:
@@ -190,20 +208,21 @@ def test_a_map_that_is_not_placed_is_beside_the_merged_map_with_its_reason(recor
     assert last.result.robots[STRANGER].status is Status.UNMERGED
     merged = last.result.merged
     right_m = merged.map_from_grid.x_m + merged.cols * merged.resolution_m
-    outline = Entity(recording, f"/merged/robots/{STRANGER_PATH}/outline").rows[-1]["LineStrips3D:strips"][0]
+    grid = last.result.grids[STRANGER].cropped_to_known()
     x_m, *_ = Entity(recording, f"/merged/robots/{STRANGER_PATH}").rows[-1]["Transform3D:translation"][0]
-    assert min(corner[0] for corner in outline) + x_m > right_m
+    assert x_m + grid.map_from_grid.x_m > right_m
     label = Entity(recording, f"/merged/labels/{STRANGER_PATH}").values("Points3D:labels")[-1]
-    reason = last.result.robots[STRANGER].reason.message
-    assert label.replace("\n", " ") == f"{STRANGER} is not merged: {reason}"
+    reason = last.result.robots[STRANGER].reason
+    assert label == f"{STRANGER}: not merged,\n{str(reason.code).replace('_', ' ')}"
+    assert reason.message in Entity(recording, "/summary").values("TextDocument:text")[-1].replace("\\", "")
 
 
 def test_labels_follow_the_status(recording: Path) -> None:
     entity = Entity(recording, "/merged/labels/r2")
     labels = dict(zip(entity.stamps, entity.values("Points3D:labels"), strict=True))
-    assert "the reference r1 has no map yet" in labels[STAMPS[0]].replace("\n", " ")
+    assert labels[STAMPS[0]] == "r2: not merged,\nno reference map"
     assert labels[STAMPS[2]] == "r2"
-    assert labels[STAMPS[4]].startswith("r2 is not merged:")
+    assert labels[STAMPS[4]].startswith("r2: not merged,\n")
     assert labels[STAMPS[5]] == "r2"
 
 
@@ -250,7 +269,7 @@ def test_decisions_say_what_happened_and_why(recording: Path) -> None:
 
 def test_the_table_has_every_robot(recording: Path) -> None:
     text = Entity(recording, "/robots").values("TextDocument:text")[-1]
-    head, rule, *rows = [line.strip("| ").split(" | ") for line in text.splitlines()]
+    head, rule, *rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("|")]
     assert head[0] == "robot"
     assert set(rule) == {"---"}
     assert [row[0] for row in rows] == list(ROBOTS)
@@ -274,11 +293,13 @@ def test_the_blueprint_opens_on_the_end_from_above(recording: Path) -> None:
     assert store.application_id == reader.recordings()[0].application_id
     logged = [row for chunk in reader.stream(store=store) for row in _rows(chunk.to_record_batch())]
     merged = {name: value for row in logged for name, value in row.items() if value}
-    assert merged["TimePanelBlueprint:timeline"] == ["log_time"]
+    assert merged["TimePanelBlueprint:timeline"] == ["elapsed"]
     assert merged["TimePanelBlueprint:play_state"] == [3]  # following: at the newest data
     assert merged["EyeControls3D:position"][0][:2] == merged["EyeControls3D:look_target"][0][:2]
     classes = [row["ViewBlueprint:class_identifier"][0] for row in logged if row.get("ViewBlueprint:class_identifier")]
-    assert {"3D", "2D", "TimeSeries", "TextLog", "TextDocument"} <= set(classes)
+    assert {"3D", "2D", "TimeSeries", "TextLog", "TextDocument", "StateTimeline"} <= set(classes)
+    names = [row["ContainerBlueprint:display_name"][0] for row in logged if row.get("ContainerBlueprint:display_name")]
+    assert {"Merged", "Method", "Over time", "Decisions", "r2"} <= set(names)
 
 
 def test_two_runs_write_the_same_but_for_the_time_they_took(
@@ -336,8 +357,8 @@ def test_a_map_larger_than_a_texture_is_shown_coarser(tmp_path: Path) -> None:
     path = written(tmp_path / "wide.rrd", events_of(["r1"], {STAMPS[0]: {"r1": Grid(cells, 0.05)}}))
     row = Entity(path, "/merged/robots/r1/map").rows[0]
     assert row["GridMap:cell_size"][0] == pytest.approx(0.1)
-    assert grid_of(row).shape == (2, MAX_SIDE_CELLS // 2 + 1)
-    assert grid_of(row).max() == 100
+    assert shades_of(row).shape == (2, MAX_SIDE_CELLS // 2 + 1)
+    assert shades_of(row)[0, 2] == shades_of(row).max() > 100
 
 
 def test_a_run_without_pictures_has_no_views_for_them(story: list[Event], tmp_path: Path) -> None:
@@ -430,7 +451,7 @@ def test_parked_maps_overlap_nothing(story: list[Event]) -> None:
         placement = replace(refused.placement, component=f"s{index}", component_from_map=Sim2(index, 0.0, 0.3 * index))
         robots[f"s{index}"] = replace(refused, placement=placement)
     corners_m = {robot: SQUARE * (1.0 + index % 3) for index, robot in enumerate(robots)}
-    layout = lay_out(replace(last, robots=robots), corners_m)
+    layout = lay_out(replace(last, robots=robots), corners_m, corners_m)
     assert list(layout.merged_from_map) == list(robots)
     boxes = [Box.around(pose.apply(corners_m[robot])) for robot, pose in layout.merged_from_map.items()]
     for index, one in enumerate(boxes):
@@ -449,8 +470,21 @@ def test_maps_that_fit_each_other_are_parked_as_they_fit(story: list[Event]) -> 
         robot: replace(refused, placement=replace(refused.placement, component="a", component_from_map=pose))
         for robot, pose in placements.items()
     }
-    shown = lay_out(replace(last, robots=robots), {"a": SQUARE, "b": SQUARE}).merged_from_map
+    shown = lay_out(replace(last, robots=robots), {"a": SQUARE, "b": SQUARE}, {}).merged_from_map
     assert (shown["a"].inverse() @ shown["b"]).is_close(fits, distance_m=1e-9, angle_rad=1e-9, at_m=(0.0, 0.0))
+
+
+def test_names_stand_where_only_their_robot_was() -> None:
+    strip_m = np.stack([np.arange(10.0), np.zeros(10)], axis=1)
+    places_m = {"a": strip_m, "b": strip_m, "c": strip_m}
+    found = label_places_m({"a": IDENTITY, "b": Sim2(4.0, 0.0), "c": Sim2(4.0, 0.0)}, places_m)
+    assert found["a"] == (0.0, 0.0)
+    assert found["b"][0] > 9.0
+    assert abs(found["c"][0] - found["b"][0]) > 3.0
+
+
+def test_the_name_of_a_map_alone_is_in_its_middle() -> None:
+    assert label_places_m({"a": IDENTITY}, {"a": np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])}) == {"a": (1.0, 0.0)}
 
 
 # The viewer
@@ -469,13 +503,16 @@ def renderer_missing() -> str | None:
 def test_the_viewer_shows_it_without_complaint(recording: Path, tmp_path: Path) -> None:
     if missing := renderer_missing():
         pytest.skip(missing)
-    from scripts.screenshot import complaints, show, viewer
+    from scripts.screenshot import complaints, show, show_tab, viewer
 
+    shown: set[str] = set()
     with viewer("1000x700") as client:
         for time_fraction in (None, 0.0, 0.5):
             show(client, recording, time_fraction)
-            assert complaints(client) == []
-        views = {view.name for view in client.get_state().views}
+            for tab in ("Merged", "Method", "Over time", "Decisions"):
+                show_tab(client, tab)
+                assert complaints(client) == []
+                shown |= {view.name for view in client.get_state().views if view.visible}
         client.save_screenshot(str(tmp_path / "shot.png"))
-    assert {"Maps", "overlay", "Acceptance index", "Decisions"} <= views
+    assert {"Maps", "Outcome", "Overlay", "Candidates", "Acceptance index", "Robots", "Skipped"} <= shown
     assert (tmp_path / "shot.png").stat().st_size > 10_000

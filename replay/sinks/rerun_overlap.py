@@ -1,0 +1,84 @@
+"""Where maps agree and contradict each other in the Rerun recording: a tint over the merged map."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import rerun as rr
+
+from mapmerge.config import CellConfig
+from mapmerge.merger import MergeResult
+from mapmerge.overlap import AGREE, CONTRADICT, overlap
+from mapmerge.warp import Layer
+from replay.sinks.rerun_entities import OVERLAP
+from replay.sinks.rerun_stream import RrdStream
+
+MAX_SIDE_CELLS = 2048
+"""Larger maps are compared in larger cells: it is a tint."""
+
+_HEIGHT_M = 0.3
+_TINT = {AGREE: (40, 190, 95, 54), CONTRADICT: (255, 40, 40, 255)}
+# The library mixes what is below in only where the whole is not quite opaque.
+_OPACITY = 0.995
+
+
+class OverlapScene:
+    """Logs the tint, when a map that is placed or a placement changed.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    cells
+        When a cell counts as occupied.
+    tolerance_m
+        How far a wall may lie from the same wall in another map.
+    """
+
+    def __init__(self, stream: RrdStream, cells: CellConfig, tolerance_m: float) -> None:
+        self._stream = stream
+        self._cells = cells
+        self._tolerance_m = tolerance_m
+        self._layers: list[Layer] = []
+        self._is_shown = False
+        self._colours = np.zeros((256, 4), np.uint8)
+        for kind, colour in _TINT.items():
+            self._colours[kind] = colour
+
+    def show(self, result: MergeResult) -> None:
+        """Log the tint if it can differ from the one before."""
+        layers = [
+            Layer(result.grids[robot], outcome.merged_from_map)
+            for robot, outcome in result.robots.items()
+            if outcome.merged_from_map is not None and robot in result.grids
+        ]
+        before, self._layers = self._layers, layers
+        if len(before) == len(layers) and all(map(Layer.is_same, before, layers)):
+            return
+        found = None
+        if result.merged is not None and len(layers) > 1:
+            found = overlap(
+                layers, result.merged, self._cells, tolerance_m=self._tolerance_m, max_side_cells=MAX_SIDE_CELLS
+            )
+        if found is None:
+            if self._is_shown:
+                self._stream.log(OVERLAP, rr.Clear(recursive=False))
+            self._is_shown = False
+            return
+        self._is_shown = True
+        rows, cols = found.kinds.shape
+        pose = found.merged_from_grid
+        half_rad = pose.yaw_rad / 2
+        self._stream.log(
+            OVERLAP,
+            rr.GridMap(
+                data=self._colours[found.kinds[::-1]].tobytes(),
+                format=rr.components.ImageFormat(width=cols, height=rows, color_model="RGBA", channel_datatype="U8"),
+                cell_size=found.resolution_m,
+                translation=[pose.x_m, pose.y_m, _HEIGHT_M],
+                quaternion=rr.Quaternion(xyzw=[0.0, 0.0, math.sin(half_rad), math.cos(half_rad)]),
+                draw_order=2.0,
+                opacity=_OPACITY,
+            ),
+        )

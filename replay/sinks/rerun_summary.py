@@ -1,0 +1,131 @@
+"""The page to read first in the Rerun recording: what is merged, how sure that is, and what went wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from replay.decisions import WARN
+from replay.events import Report
+from replay.sinks.rerun_entities import RobotEntities
+from replay.sinks.rerun_text import cell, paragraph
+from replay.words import counted
+
+_MOST_SAID = 8
+_MOST_WRONG = 6
+_STATUSES = {"unmerged": "**not merged**", "no_map": "**without a map**"}
+_EVENTS = {"jumped": "jumped in its own frame", "withdrawn": "was withdrawn for a time"}
+
+LEGEND = """\
+**Walls** and ways are in the colour of the robot that mapped or drove them. Grey floors are known to one map alone.
+
+**Green** ground: two maps or more know it, and agree. **Red**: a wall of one map in free space of another.
+
+A map that is **not merged** stands beside the merged one.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """An entry of the log, and how long after the first tick it was said."""
+
+    since_s: float
+    level: str
+    words: str
+
+    @property
+    def since(self) -> str:
+        """When it was said, in words."""
+        return f"+{self.since_s:.1f} s"
+
+
+def summary(report: Report, robots: Sequence[RobotEntities], said: Sequence[Said], since_s: float | None) -> str:
+    """Return the page as of now, in Markdown.
+
+    Parameters
+    ----------
+    report
+        As of now.
+    robots
+        The robots, the reference first.
+    said
+        The log so far.
+    since_s
+        How long after the first tick it is; None where there was none.
+    """
+    parts = [f"# {_headline(report)}"]
+    if since_s is not None:
+        parts.append(f"after {since_s:.1f} s, in the map frame of **{cell(robots[0].robot)}**, the reference")
+    parts.append(_table(report, robots))
+    parts += ["### What went wrong", *_items(_wrong(report), "Nothing: no map was refused, nothing was skipped.")]
+    parts += ["### Decisions", *_items(_lately(said), "None yet.")]
+    return "\n\n".join(parts) + "\n"
+
+
+def _headline(report: Report) -> str:
+    robots = report["robots"].values()
+    merged = sum(values["merged_from_map"] is not None for values in robots)
+    if merged == len(robots) > 1:
+        return f"All {merged} robots are merged"
+    return f"{merged} of {counted(len(robots), 'robot')} {'is' if merged == 1 else 'are'} in the merged map"
+
+
+def _table(report: Report, robots: Sequence[RobotEntities]) -> str:
+    """Return one row for each robot; of few and short columns, as tables do not wrap."""
+    rows = [("robot", "colour", "is", "how sure", "overlap"), ("---",) * 5]
+    for entities in robots:
+        values = report["robots"][entities.robot]
+        rows.append((f"**{cell(entities.robot)}**", entities.colour_name, _is(values), _sure(values), _overlap(values)))
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+
+def _is(values: Mapping[str, Any]) -> str:
+    if values["placed_via"] is not None and values["merged_from_map"] is not None:
+        return f"merged, on {cell(values['placed_via'])}"
+    return _STATUSES.get(values["status"], str(values["status"]))
+
+
+def _sure(values: Mapping[str, Any]) -> str:
+    if values["merged_from_map"] is None or values["placed_via"] is None:
+        return "–"
+    if values["confidence"] is not None:
+        return f"{100 * values['confidence']:.2f} %"
+    return "–" if values["acceptance"] is None else f"acceptance {values['acceptance']:.3f}"
+
+
+def _overlap(values: Mapping[str, Any]) -> str:
+    is_placed = values["merged_from_map"] is not None and values["overlap_m2"] is not None
+    return f"{values['overlap_m2']:.0f} m²" if is_placed else "–"
+
+
+def _wrong(report: Report) -> list[str]:
+    """Say which robots are not merged and why, what jumped or was withdrawn, and how much was skipped."""
+    found = [
+        f"**{cell(robot)}** is not merged: {paragraph(values['reason']['message'])}"
+        for robot, values in report["robots"].items()
+        if values["merged_from_map"] is None
+    ]
+    if skipped := sum(report["skipped"].values()):
+        causes = ", ".join(f"{count} {cell(cause)}" for cause, count in report["skipped"].items())
+        found.append(f"{counted(skipped, 'message')} skipped: {causes}; see *Decisions*")
+    events = [item for item in report["history"] if item["event"] in ("jumped", "withdrawn")]
+    found += [
+        f"**{cell(item['robot'])}** {_EVENTS[item['event']]}: {paragraph(item['reason']['message'])}" for item in events
+    ]
+    if len(found) > _MOST_WRONG:
+        found = [*found[:_MOST_WRONG], f"and {len(found) - _MOST_WRONG} more: see *Decisions*"]
+    return found
+
+
+def _lately(said: Sequence[Said]) -> Iterator[str]:
+    if len(said) > _MOST_SAID:
+        yield f"*{len(said) - _MOST_SAID} earlier ones: see* Decisions"
+    for item in said[-_MOST_SAID:]:
+        words = paragraph(item.words)
+        yield f"**{item.since}** {'! ' if item.level == WARN else ''}{words}"
+
+
+def _items(items: Sequence[str] | Iterator[str], otherwise: str) -> list[str]:
+    lines = [f"- {item}" for item in items]
+    return ["\n".join(lines)] if lines else [otherwise]
