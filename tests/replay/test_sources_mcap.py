@@ -14,9 +14,12 @@ from mcap.reader import make_reader
 from mcap.records import Message
 from mcap.writer import IndexType, Writer
 
-from replay.sources import mcap_chunk, mcap_file, mcap_scan, open_source
+from replay.sources import open_source
 from replay.sources.chunks import FEW_CHUNKS, ChunkCache
-from replay.sources.mcap_records import MAGIC, RecordFile
+from replay.sources.mcap import chunk as mcap_chunk
+from replay.sources.mcap import file as mcap_file
+from replay.sources.mcap import scan as mcap_scan
+from replay.sources.mcap.records import MAGIC, RecordFile
 from tests import bags
 from tests.bags import NO_INDEX, NO_SUMMARY, SAMPLE, START, in_order
 from tests.replay.test_sources_open import refused
@@ -47,7 +50,7 @@ def test_without_an_index_damage_anywhere_is_found(tmp_path: Path, options: dict
 
 def test_with_an_index_the_file_is_not_passed_through(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = bags.write_mcap(tmp_path / "a.mcap")
-    monkeypatch.setattr("replay.sources.mcap_file.scan", None)
+    monkeypatch.setattr("replay.sources.mcap.file.scan", None)
     assert _times(path) == _expected()
 
 
@@ -256,7 +259,7 @@ def test_a_chunk_is_let_go_of_once_all_its_messages_are_read(tmp_path: Path, mon
             super().__init__(load, uses, most_bytes)
             caches.append(self)
 
-    monkeypatch.setattr("replay.sources.mcap_file.ChunkCache", Watched)
+    monkeypatch.setattr("replay.sources.mcap.file.ChunkCache", Watched)
     with open_source(bags.write_mcap(tmp_path / "a.mcap", chunk_bytes=1)) as source:
         for _ in source.messages(["/r1/map"]):
             assert len(caches[-1]) == 0

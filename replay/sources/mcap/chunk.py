@@ -16,7 +16,7 @@ from io import BytesIO
 from typing import NamedTuple
 
 from replay.skip_cause import SkipCause
-from replay.sources.mcap_records import (
+from replay.sources.mcap.records import (
     CHANNEL,
     CHUNK,
     MESSAGE,

@@ -1,7 +1,7 @@
 """Where the messages of an MCAP file are, from its summary: which chunks hold which channels, and where in them.
 
 The summary serves where it is complete. Any of its parts may be missing, and messages may lie outside of chunks, where
-no index finds them; then `replay.sources.mcap_scan` passes through the file instead.
+no index finds them; then `replay.sources.mcap.scan` passes through the file instead.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from replay.sources.mcap_chunk import BadPart, inner_records
-from replay.sources.mcap_records import (
+from replay.sources.mcap.chunk import BadPart, inner_records
+from replay.sources.mcap.records import (
     CHANNEL,
     CHUNK_INDEX,
     DATA_END,

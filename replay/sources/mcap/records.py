@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, BinaryIO, NamedTuple, TypeVar
 
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
 from replay.sources.boundary import COMMON
-from replay.sources.definitions import LARGEST_CHARS, differing_field
+from replay.sources.definitions.difference import LARGEST_CHARS, differing_field
 from replay.sources.topics import ENCODINGS, normalised_type, type_in
 
 if TYPE_CHECKING:
