@@ -15,8 +15,10 @@ from replay.sinks.mcap_copy import McapCopy
 from replay.skip_cause import SkipCause
 from replay.sources.boundary import OF_LIBRARIES
 from replay.sources.losses import Loss
+from replay.sources.mcap.channels import NO_SCHEMA
 from replay.sources.mcap.chunk import BadPart, chunk_content, cut_chunk_content, inner_records
 from replay.sources.mcap.index import read_summary
+from replay.sources.mcap.record_file import RecordFile
 from replay.sources.mcap.records import (
     ATTACHMENT,
     CHANNEL,
@@ -26,11 +28,9 @@ from replay.sources.mcap.records import (
     MESSAGE,
     MESSAGE_HEAD,
     METADATA,
-    NO_SCHEMA,
     SCHEMA,
     MessageHeader,
     Record,
-    RecordFile,
     foreign_errors,
     message_header,
     parser_stream,

@@ -19,7 +19,8 @@ from replay.sources.chunks import FEW_CHUNKS, ChunkCache
 from replay.sources.mcap import chunk as mcap_chunk
 from replay.sources.mcap import file as mcap_file
 from replay.sources.mcap import scan as mcap_scan
-from replay.sources.mcap.records import MAGIC, RecordFile
+from replay.sources.mcap.record_file import RecordFile
+from replay.sources.mcap.records import MAGIC
 from tests import bags
 from tests.bags import NO_INDEX, NO_SUMMARY, SAMPLE, START, in_order
 from tests.replay.test_sources_open import refused

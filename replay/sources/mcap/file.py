@@ -15,18 +15,11 @@ from replay.sources.boundary import TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
 from replay.sources.lapses import lapse_of
 from replay.sources.losses import Loss, Losses
+from replay.sources.mcap.channels import Channel
 from replay.sources.mcap.chunk import BadPart, chunk_content, cut_chunk_content
 from replay.sources.mcap.index import NO_CHUNK, Contents, Entry, indexed_entries, read_summary
-from replay.sources.mcap.records import (
-    CHUNK,
-    MAGIC,
-    Channel,
-    RecordFile,
-    foreign_errors,
-    message_data,
-    message_header_at,
-    written_bytes,
-)
+from replay.sources.mcap.record_file import RecordFile, written_bytes
+from replay.sources.mcap.records import CHUNK, MAGIC, foreign_errors, message_data, message_header_at
 from replay.sources.mcap.scan import Scan, chunk_loss, indexed_counts, scan, unknown_types
 from replay.sources.memory import MOST_BYTES, TooLargeError
 from replay.sources.topics import ENCODINGS, topic_table

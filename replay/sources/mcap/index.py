@@ -13,7 +13,9 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+from replay.sources.mcap.channels import NO_SCHEMA, Channel, ChannelTable, check_description
 from replay.sources.mcap.chunk import BadPart, inner_records
+from replay.sources.mcap.record_file import RecordFile
 from replay.sources.mcap.records import (
     CHANNEL,
     CHUNK_INDEX,
@@ -21,14 +23,9 @@ from replay.sources.mcap.records import (
     FOOTER,
     MAGIC,
     MESSAGE_HEAD,
-    NO_SCHEMA,
     RECORD,
     SCHEMA,
     STATISTICS,
-    Channel,
-    ChannelTable,
-    RecordFile,
-    check_description,
     foreign_errors,
     parser_stream,
 )

@@ -19,6 +19,7 @@ from replay.skip_cause import SkipCause
 from replay.sources.boundary import COPY_AGAIN
 from replay.sources.lapses import AT_END, Place, Written, lapse_of
 from replay.sources.losses import Loss
+from replay.sources.mcap.channels import Channel, ChannelTable, check_description
 from replay.sources.mcap.chunk import (
     BadPart,
     Inside,
@@ -29,6 +30,7 @@ from replay.sources.mcap.chunk import (
     inside_of,
 )
 from replay.sources.mcap.index import NO_CHUNK, Contents, Entry, Summary, file_crc, statistics_between
+from replay.sources.mcap.record_file import RecordFile
 from replay.sources.mcap.records import (
     CHANNEL,
     CHUNK,
@@ -36,12 +38,8 @@ from replay.sources.mcap.records import (
     MAGIC,
     MESSAGE,
     SCHEMA,
-    Channel,
-    ChannelTable,
     MessageHeader,
     Record,
-    RecordFile,
-    check_description,
     message_header,
     message_header_at,
 )
