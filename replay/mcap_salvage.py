@@ -17,7 +17,6 @@ from replay.sources.boundary import OF_LIBRARIES
 from replay.sources.losses import Loss
 from replay.sources.mcap.channels import NO_SCHEMA
 from replay.sources.mcap.chunk import BadPart, chunk_content, cut_chunk_content, inner_records
-from replay.sources.mcap.index import read_summary
 from replay.sources.mcap.record_file import RecordFile
 from replay.sources.mcap.records import (
     ATTACHMENT,
@@ -36,6 +35,7 @@ from replay.sources.mcap.records import (
     parser_stream,
 )
 from replay.sources.mcap.scan import Scan, scan
+from replay.sources.mcap.summary import read_summary
 from replay.sources.mcap.walk import Gap, Walk
 from replay.sources.memory import MORE_ALLOWED
 from replay.words import counted

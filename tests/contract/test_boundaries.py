@@ -251,7 +251,7 @@ OURS = {
     "bag, its index": ("replay.sources.rosbag1.index._check_chunk_counts", _reading(*OPEN_BAG)),
     "bag, a message": ("replay.sources.rosbag1.file._message_at", _reading(*OPEN_BAG)),
     "mcap": ("replay.sources.mcap.file.topic_table", _reading(bags.write_mcap, "run.mcap")),
-    "mcap, its summary": ("replay.sources.mcap.index._is_complete", _reading(bags.write_mcap, "run.mcap")),
+    "mcap, its summary": ("replay.sources.mcap.summary._is_complete", _reading(bags.write_mcap, "run.mcap")),
     "mcap, a message": ("replay.sources.mcap.chunk_reader.message_header_at", _reading(bags.write_mcap, "run.mcap")),
     "db3": ("replay.sources.sqlite3.file._topic", _reading(bags.write_bare_db3, "run.db3")),
     "db3, a message": ("replay.sources.sqlite3.file.decompressed_cdr", _reading(bags.write_bare_db3, "run.db3")),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -134,3 +135,13 @@ def written_bytes(file: BinaryIO, size: int) -> int:
             break
         end = start
     return end if size - end >= _LEAST_UNWRITTEN_BYTES else size
+
+
+def file_crc(file: RecordFile, start: int, stop: int) -> int:
+    """Return the checksum of bytes of a file."""
+    crc = 0
+    file.file.seek(start)
+    while start < stop and (block := file.file.read(min(_BLOCK_BYTES, stop - start))):
+        crc = zlib.crc32(block, crc)
+        start += len(block)
+    return crc

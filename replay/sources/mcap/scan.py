@@ -29,8 +29,8 @@ from replay.sources.mcap.chunk import (
     inner_records,
     inside_of,
 )
-from replay.sources.mcap.index import NO_CHUNK, Contents, Entry, Summary, file_crc, statistics_between
-from replay.sources.mcap.record_file import RecordFile
+from replay.sources.mcap.index import NO_CHUNK, Entry
+from replay.sources.mcap.record_file import RecordFile, file_crc
 from replay.sources.mcap.records import (
     CHANNEL,
     CHUNK,
@@ -43,6 +43,7 @@ from replay.sources.mcap.records import (
     message_header,
     message_header_at,
 )
+from replay.sources.mcap.summary import Contents, Summary, statistics_between
 from replay.sources.mcap.walk import Walk
 from replay.sources.memory import over_memory
 from replay.words import counted
