@@ -19,7 +19,7 @@ from mapmerge.prepare import prepare
 from mapmerge.prepared import PreparedMap
 from mapmerge.sim2 import Sim2, wrap_angle
 from mapmerge.verify import Scores, verify
-from replay.sources.map_image import Thresholds, cells_from_pixels
+from replay.sources.map_server.map_image import Thresholds, cells_from_pixels
 
 MAX_ERROR_M = 0.25
 MAX_ERROR_DEG = 2.0

@@ -15,9 +15,10 @@ from replay.sinks.mcap_copy import McapCopy
 from replay.skip_cause import SkipCause
 from replay.sources.boundary import OF_LIBRARIES
 from replay.sources.losses import Loss
-from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content, inner_records
-from replay.sources.mcap_index import read_summary
-from replay.sources.mcap_records import (
+from replay.sources.mcap.channels import NO_SCHEMA
+from replay.sources.mcap.chunk import BadPart, chunk_content, cut_chunk_content, inner_records
+from replay.sources.mcap.record_file import RecordFile
+from replay.sources.mcap.records import (
     ATTACHMENT,
     CHANNEL,
     CHUNK,
@@ -26,17 +27,16 @@ from replay.sources.mcap_records import (
     MESSAGE,
     MESSAGE_HEAD,
     METADATA,
-    NO_SCHEMA,
     SCHEMA,
     MessageHeader,
     Record,
-    RecordFile,
     foreign_errors,
     message_header,
     parser_stream,
 )
-from replay.sources.mcap_scan import Scan, scan
-from replay.sources.mcap_walk import Gap, Walk
+from replay.sources.mcap.scan import Scan, scan
+from replay.sources.mcap.summary import read_summary
+from replay.sources.mcap.walk import Gap, Walk
 from replay.sources.memory import MORE_ALLOWED
 from replay.words import counted
 

@@ -19,7 +19,8 @@ from replay.sinks.mcap_copy import McapCopy
 from replay.sinks.partial_file import PartialFile, partial_name, recovering_name
 from replay.sinks.publication import publish
 from replay.sources.boundary import translated
-from replay.sources.mcap_records import MAGIC, RecordFile, written_bytes
+from replay.sources.mcap.record_file import RecordFile, written_bytes
+from replay.sources.mcap.records import MAGIC
 from replay.sources.memory import MOST_BYTES
 from replay.words import counted, moment, recovered
 

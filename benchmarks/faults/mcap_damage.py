@@ -24,7 +24,7 @@ from benchmarks.faults.mcap_layout import (
     written,
 )
 from replay.sources.base import GRID_TYPE
-from replay.sources.mcap_records import MAGIC
+from replay.sources.mcap.records import MAGIC
 from samples.world import Rng
 
 Records = list[Record]

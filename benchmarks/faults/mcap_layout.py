@@ -7,16 +7,7 @@ import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from replay.sources.mcap_records import (
-    CHANNEL,
-    CHUNK,
-    CHUNK_INDEX,
-    FOOTER,
-    MAGIC,
-    MESSAGE_INDEX,
-    SCHEMA,
-    STATISTICS,
-)
+from replay.sources.mcap.records import CHANNEL, CHUNK, CHUNK_INDEX, FOOTER, MAGIC, MESSAGE_INDEX, SCHEMA, STATISTICS
 
 __all__ = [
     "CHANNEL",

@@ -8,7 +8,7 @@ from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
 from replay.sinks.mcap_output import McapOutput
 from replay.sinks.partial_file import PartialFile
-from replay.sources.mcap_records import MessageHeader
+from replay.sources.mcap.records import MessageHeader
 
 _NO_SCHEMA = 0
 

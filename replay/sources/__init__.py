@@ -1,6 +1,6 @@
 """Recordings, whatever their format: `open_source` tells which it is by what is in it.
 
-A format is one module with a class that has `SourceClass`'s shape, and one row of `SOURCES`.
+A format is one module, or one folder of them, with a class that has `SourceClass`'s shape, and one row of `SOURCES`.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from replay.sources.memory import MOST_BYTES
 # Tried in this order. The modules are imported for their `recognises` and import what they read with only when they
 # are used.
 SOURCES: dict[str, str] = {
-    "rosbag1": "replay.sources.rosbag1:Rosbag1File",
-    "mcap": "replay.sources.mcap_file:McapFile",
-    "rosbag2": "replay.sources.rosbag2_folder:Rosbag2Folder",
-    "sqlite3": "replay.sources.sqlite3_file:Sqlite3File",
+    "rosbag1": "replay.sources.rosbag1.file:Rosbag1File",
+    "mcap": "replay.sources.mcap.file:McapFile",
+    "rosbag2": "replay.sources.rosbag2.folder:Rosbag2Folder",
+    "sqlite3": "replay.sources.sqlite3.file:Sqlite3File",
     "zstd": "replay.sources.compressed_file:CompressedFile",
-    "map_server": "replay.sources.map_server:SavedMap",
+    "map_server": "replay.sources.map_server.saved_map:SavedMap",
 }
 
 # Of all outputs together, of the Rerun library's threads (which abort the program if there are none), and of imports.

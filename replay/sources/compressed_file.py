@@ -14,10 +14,10 @@ from replay.sources.beginnings import HEAD_BYTES, nothing_there
 from replay.sources.boundary import COMMON, COPY_AGAIN, Closing, translated
 from replay.sources.lapses import AT_END
 from replay.sources.losses import Loss
-from replay.sources.mcap_file import McapFile
+from replay.sources.mcap.file import McapFile
 from replay.sources.memory import MOST_BYTES
-from replay.sources.rosbag1 import Rosbag1File
-from replay.sources.sqlite3_file import Sqlite3File
+from replay.sources.rosbag1.file import Rosbag1File
+from replay.sources.sqlite3.file import Sqlite3File
 from replay.sources.temporary import temporary_folder
 from replay.sources.zstd import MAGIC, ZstdError, decompress_file
 

@@ -36,7 +36,7 @@ from mapmerge.sim2 import Sim2
 from replay.codec import decode
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE, RawMessage
-from replay.sources.mcap_file import McapFile
+from replay.sources.mcap.file import McapFile
 from replay.sources.zstd import zstd
 
 SEED = 7

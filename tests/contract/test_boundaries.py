@@ -142,11 +142,11 @@ def _recovering(folder: Path) -> Callable[[], object]:
     return partial(recover, bags.write_mcap(folder / "run.mcap"), folder / "out.mcap")
 
 
-PIXELS = np.zeros((4, 5), np.uint8)
 ZSTD = zstd.zstd.__name__
 TYPESTORE = "rosbags.typesys.store.Typestore"
 RERUN = (*SYSTEM, RuntimeError(), PanicException("!"))
 OPEN_BAG, OPEN_FOLDER = (bags.write_rosbag1, "run.bag"), (bags.write_rosbag2, "run")
+OPEN_SAVED_MAP = (bags.write_saved_map, "map.yaml", np.zeros((4, 5), np.uint8))
 BOUNDARIES = {
     "bag, opened": Boundary("rosbags.rosbag1.Reader.open", _reading(*OPEN_BAG), (), SYSTEM[:2]),
     "bag, its index": Boundary(
@@ -190,10 +190,8 @@ BOUNDARIES = {
     "compressed alone": Boundary(
         f"{ZSTD}.ZstdDecompressor", _reading(_compressed, "run.mcap"), ("zstd",), SYSTEM, InputError
     ),
-    "saved map, its description": Boundary(
-        "ruamel.yaml.YAML.load", _reading(bags.write_saved_map, "map.yaml", PIXELS), ("yaml",)
-    ),
-    "saved map, its image": Boundary("cv2.imdecode", _reading(bags.write_saved_map, "map.yaml", PIXELS), ("opencv",)),
+    "saved map, its description": Boundary("ruamel.yaml.YAML.load", _reading(*OPEN_SAVED_MAP), ("yaml",)),
+    "saved map, its image": Boundary("cv2.imdecode", _reading(*OPEN_SAVED_MAP), ("opencv",)),
     "a message": Boundary(
         f"{TYPESTORE}.deserialize_cdr", _reading(bags.write_mcap, "run.mcap"), ("rosbags messages",), ()
     ),
@@ -249,19 +247,25 @@ def test_is_an_error_of_ours_in_one_line(
 
 # One function of ours for each source, met when it is opened or read.
 OURS = {
-    "bag": ("replay.sources.rosbag1.topic_table", _reading(*OPEN_BAG)),
-    "bag, its index": ("replay.sources.rosbag1_index._check_chunk_counts", _reading(*OPEN_BAG)),
-    "bag, a message": ("replay.sources.rosbag1._message_at", _reading(*OPEN_BAG)),
-    "mcap": ("replay.sources.mcap_file.topic_table", _reading(bags.write_mcap, "run.mcap")),
-    "mcap, its summary": ("replay.sources.mcap_index._is_complete", _reading(bags.write_mcap, "run.mcap")),
-    "mcap, a message": ("replay.sources.mcap_file.message_header_at", _reading(bags.write_mcap, "run.mcap")),
-    "db3": ("replay.sources.sqlite3_file._topic", _reading(bags.write_bare_db3, "run.db3")),
-    "db3, a message": ("replay.sources.sqlite3_file.decompressed_cdr", _reading(bags.write_bare_db3, "run.db3")),
-    "folder": ("replay.sources.rosbag2_folder.listed_parts", _reading(*OPEN_FOLDER)),
-    "folder, a part": ("replay.sources.rosbag2_folder.plain_copy", _reading(*OPEN_FOLDER)),
+    "bag": ("replay.sources.rosbag1.file.topic_table", _reading(*OPEN_BAG)),
+    "bag, its index": ("replay.sources.rosbag1.index._check_chunk_counts", _reading(*OPEN_BAG)),
+    "bag, a message": ("replay.sources.rosbag1.file._message_at", _reading(*OPEN_BAG)),
+    "mcap": ("replay.sources.mcap.file.topic_table", _reading(bags.write_mcap, "run.mcap")),
+    "mcap, its summary": ("replay.sources.mcap.summary._is_complete", _reading(bags.write_mcap, "run.mcap")),
+    "mcap, a message": ("replay.sources.mcap.chunk_reader.message_header_at", _reading(bags.write_mcap, "run.mcap")),
+    "db3": ("replay.sources.sqlite3.file._topic", _reading(bags.write_bare_db3, "run.db3")),
+    "db3, a message": ("replay.sources.sqlite3.file.decompressed_cdr", _reading(bags.write_bare_db3, "run.db3")),
+    "folder": ("replay.sources.rosbag2.folder.listed_parts", _reading(*OPEN_FOLDER)),
+    "folder, a part": ("replay.sources.rosbag2.folder.plain_copy", _reading(*OPEN_FOLDER)),
     "compressed": ("replay.sources.compressed_file.plain_copy", _reading(_compressed, "run.mcap")),
-    "saved map": ("replay.sources.map_server._resolution_m", _reading(bags.write_saved_map, "map.yaml", PIXELS)),
-    "saved map, its image": ("replay.sources.image_file.header_of", _reading(bags.write_saved_map, "map.yaml", PIXELS)),
+    "saved map": (
+        "replay.sources.map_server.saved_map._resolution_m",
+        _reading(*OPEN_SAVED_MAP),
+    ),
+    "saved map, its image": (
+        "replay.sources.map_server.image_file.header_of",
+        _reading(*OPEN_SAVED_MAP),
+    ),
 }
 BUGS = (TypeError(), AttributeError(), KeyError(), IndexError(), AssertionError(), ZeroDivisionError(), RuntimeError())
 

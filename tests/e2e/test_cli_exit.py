@@ -134,7 +134,7 @@ def test_a_bug_ends_with_a_status_and_a_word(replay: Program, two: Path, monkeyp
 @pytest.mark.parametrize(
     "where",
     [
-        "replay.sources.mcap_file.message_data",
+        "replay.sources.mcap.chunk_reader.message_data",
         "replay.sinks.mcap_file.McapSink._tick",
         "replay.arrivals.assemble",
         "replay.sinks.json_file.report_text",

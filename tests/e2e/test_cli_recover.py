@@ -29,7 +29,7 @@ from replay.sinks.mcap_copy import McapCopy
 from replay.sinks.partial_file import PartialFile
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE
-from replay.sources.mcap_records import MAGIC
+from replay.sources.mcap.records import MAGIC
 from tests.bags import START, chunks
 from tests.outputs import metadata, raw, summary, topics
 from tests.program import Program, Ran

@@ -12,7 +12,7 @@ import pytest
 
 from replay.interrupts import NUMBERS
 from replay.sinks.partial_file import PartialFile
-from replay.sources.mcap_file import McapFile
+from replay.sources.mcap.file import McapFile
 from tests.bags import write_mcap
 from tests.program import PROGRAM, Program, quiet, started, wait_for
 from tests.runs import flat_map, seen

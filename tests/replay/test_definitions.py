@@ -8,8 +8,8 @@ from rosbags.typesys import get_types_from_msg
 
 from replay.codec import ros1_typestore, ros2_typestore
 from replay.sources.base import GRID_TYPE, TF_TYPE, UPDATE_TYPE
-from replay.sources.definition_text import stated_fields
-from replay.sources.definitions import _type_name, differing_field
+from replay.sources.definitions.difference import _type_name, differing_field
+from replay.sources.definitions.text import stated_fields
 
 LINE = "=" * 80
 

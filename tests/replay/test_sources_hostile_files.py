@@ -11,8 +11,9 @@ import cv2
 import numpy as np
 import pytest
 
-from replay.sources import image_file, map_server, open_source, yaml_text
-from replay.sources.image_file import header_of
+from replay.sources import open_source, yaml_text
+from replay.sources.map_server import image_file, saved_map
+from replay.sources.map_server.image_file import header_of
 from tests.bags import SAMPLE, write_rosbag2, write_saved_map
 from tests.replay.test_sources_open import refused
 
@@ -195,4 +196,4 @@ def test_the_size_of_an_image_is_told_from_its_header(extension: str, shape: tup
     ],
 )
 def test_paths_by_which_windows_would_ask_another_machine(image: str, is_elsewhere: bool) -> None:
-    assert map_server._names_another_machine(image) == is_elsewhere
+    assert saved_map._names_another_machine(image) == is_elsewhere

@@ -11,7 +11,7 @@ from mapmerge.grid import Grid
 from replay.codec import decode
 from replay.messages import GridMessage
 from replay.sources import open_source
-from replay.sources.map_image import Mode, Thresholds, cells_from_pixels
+from replay.sources.map_server.map_image import Mode, Thresholds, cells_from_pixels
 from tests.bags import write_saved_map
 from tests.data_paths import shared_data
 from tests.replay.test_sources_open import refused

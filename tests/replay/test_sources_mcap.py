@@ -14,9 +14,14 @@ from mcap.reader import make_reader
 from mcap.records import Message
 from mcap.writer import IndexType, Writer
 
-from replay.sources import mcap_chunk, mcap_file, mcap_scan, open_source
+from replay.sources import open_source
 from replay.sources.chunks import FEW_CHUNKS, ChunkCache
-from replay.sources.mcap_records import MAGIC, RecordFile
+from replay.sources.mcap import chunk as mcap_chunk
+from replay.sources.mcap import chunk_reader
+from replay.sources.mcap import file as mcap_file
+from replay.sources.mcap import scan as mcap_scan
+from replay.sources.mcap.record_file import RecordFile
+from replay.sources.mcap.records import MAGIC
 from tests import bags
 from tests.bags import NO_INDEX, NO_SUMMARY, SAMPLE, START, in_order
 from tests.replay.test_sources_open import refused
@@ -47,7 +52,7 @@ def test_without_an_index_damage_anywhere_is_found(tmp_path: Path, options: dict
 
 def test_with_an_index_the_file_is_not_passed_through(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = bags.write_mcap(tmp_path / "a.mcap")
-    monkeypatch.setattr("replay.sources.mcap_file.scan", None)
+    monkeypatch.setattr("replay.sources.mcap.file.scan", None)
     assert _times(path) == _expected()
 
 
@@ -113,7 +118,7 @@ def test_an_unindexed_file_is_read_a_chunk_at_a_time(tmp_path: Path, monkeypatch
     path = bags.write_mcap(tmp_path / "a.mcap", **NO_SUMMARY)
     loaded: list[int] = []
     original = mcap_chunk.chunk_content
-    for module in (mcap_file, mcap_scan):
+    for module in (chunk_reader, mcap_scan):
         monkeypatch.setattr(
             module, "chunk_content", lambda file, start: (loaded.append(start), original(file, start))[1]
         )
@@ -200,13 +205,13 @@ def test_file_without_messages(tmp_path: Path) -> None:
 
 def test_chunks_that_are_needed_in_turn_are_loaded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     loads: Counter[int] = Counter()
-    content = mcap_file.chunk_content
+    content = chunk_reader.chunk_content
 
     def counted(file: RecordFile, start: int) -> tuple[bytes, bool]:
         loads[start] += 1
         return content(file, start)
 
-    monkeypatch.setattr(mcap_file, "chunk_content", counted)
+    monkeypatch.setattr(chunk_reader, "chunk_content", counted)
     robots, maps = 9, 20
     one_after_the_other = [
         replace(bags.recorded_map(f"/r{robot}/map", bags.START, seed=robot), log_time_ns=bags.START + number)
@@ -256,7 +261,7 @@ def test_a_chunk_is_let_go_of_once_all_its_messages_are_read(tmp_path: Path, mon
             super().__init__(load, uses, most_bytes)
             caches.append(self)
 
-    monkeypatch.setattr("replay.sources.mcap_file.ChunkCache", Watched)
+    monkeypatch.setattr("replay.sources.mcap.chunk_reader.ChunkCache", Watched)
     with open_source(bags.write_mcap(tmp_path / "a.mcap", chunk_bytes=1)) as source:
         for _ in source.messages(["/r1/map"]):
             assert len(caches[-1]) == 0

@@ -24,11 +24,12 @@ from mcap.writer import Writer
 from replay.codec import ros2_message_definition
 from replay.errors import InputError
 from replay.skip_cause import SkipCause
-from replay.sources import mcap_walk, open_source
+from replay.sources import open_source
 from replay.sources.base import GRID_TYPE, TF_TYPE, RawMessage, SourceInfo
 from replay.sources.losses import Loss
-from replay.sources.mcap_file import McapFile
-from replay.sources.mcap_records import MAGIC
+from replay.sources.mcap import walk as mcap_walk
+from replay.sources.mcap.file import McapFile
+from replay.sources.mcap.records import MAGIC
 from tests import bags
 from tests.bags import NO_INDEX, NO_SUMMARY, SAMPLE, SECOND, START, Recorded
 

@@ -18,7 +18,7 @@ from replay.skip_cause import SkipCause
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE
 from replay.sources.losses import Loss
-from replay.sources.rosbag1 import Rosbag1File
+from replay.sources.rosbag1.file import Rosbag1File
 from tests import bags
 from tests.bags import SECOND, START
 from tests.replay.test_sources_open import refused

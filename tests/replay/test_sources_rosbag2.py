@@ -12,9 +12,10 @@ import pytest
 
 from replay.errors import InputError
 from replay.skip_cause import SkipCause
-from replay.sources import mcap_file, open_source
+from replay.sources import open_source
 from replay.sources.base import RawMessage, SourceInfo
-from replay.sources.rosbag2_folder import merged_by_time
+from replay.sources.mcap import file as mcap_file
+from replay.sources.rosbag2.folder import merged_by_time
 from replay.sources.zstd import MAGIC, zstd
 from tests import bags
 from tests.bags import SECOND, START

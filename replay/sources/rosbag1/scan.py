@@ -16,8 +16,8 @@ from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
 from replay.sources.lapses import Place, Written
 from replay.sources.losses import Loss, Losses
-from replay.sources.rosbag1_chunks import ChunkPlace, Problem, read_chunk, records_in
-from replay.sources.rosbag1_records import (
+from replay.sources.rosbag1.chunks import ChunkPlace, Problem, read_chunk, records_in
+from replay.sources.rosbag1.records import (
     CHUNK,
     CHUNK_INFO,
     CONNECTION,

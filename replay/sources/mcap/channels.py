@@ -1,113 +1,30 @@
-"""The records of an MCAP file: where they are, and what the few that matter say.
+"""What the schemas and channels of an MCAP file say: of which topic and type messages are, and why some cannot be used.
 
-Records are walked by their headers, so that only what is needed is read. No length is believed before what it says
-fits: neither that of a record nor those of the texts within it.
+No length is believed before what it says fits: neither that of a record nor those of the texts within it.
 """
 
 from __future__ import annotations
 
-import functools
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass
-from io import BytesIO
-from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
-from replay.sources.boundary import COMMON
-from replay.sources.definitions import LARGEST_CHARS, differing_field
+from replay.sources.definitions.difference import LARGEST_CHARS, differing_field
+from replay.sources.mcap.records import CHANNEL, SCHEMA, Record
 from replay.sources.topics import ENCODINGS, normalised_type, type_in
-
-if TYPE_CHECKING:
-    from mcap.data_stream import ReadDataStream
-
-MAGIC = b"\x89MCAP0\r\n"
-
-HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
-ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END = range(9, 16)
-
-RECORD = struct.Struct("<BQ")
-MESSAGE_HEAD = struct.Struct("<HIQQ")
-_INDEX_HEAD = struct.Struct("<HI")
-_INDEX_ROW = struct.Struct("<QQ")
-_U16 = struct.Struct("<H")
-_U32 = struct.Struct("<I")
 
 NO_SCHEMA = "its schema is nowhere in the file"
 
-_BLOCK_BYTES = 1 << 20
-_INDEX_BLOCK_BYTES = _INDEX_ROW.size << 12
-_LEAST_UNWRITTEN_BYTES = 16
+_U16 = struct.Struct("<H")
+_U32 = struct.Struct("<I")
+
 _MOST_DESCRIPTION_BYTES = 1 << 24
 _MOST_DESCRIPTIONS_BYTES = 1 << 26
 _BYTES_A_CHARACTER = 4
 
 _DEFINED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 _DEFINITION_ENCODINGS = {"ros2msg", "ros1msg", "ros2idl", "omgidl"}
-
-
-@functools.cache
-def foreign_errors() -> tuple[type[Exception], ...]:
-    """Return what may be raised below a source of MCAP files."""
-    from mcap.exceptions import McapError
-    from zstandard import ZstdError
-
-    from replay.sources.zstd import ZstdError as MessageZstdError
-
-    return (*COMMON, McapError, ZstdError, MessageZstdError)
-
-
-def parser_stream(content: bytes) -> ReadDataStream:
-    """Return a record's content for the parsers of the mcap package."""
-    from mcap.data_stream import ReadDataStream
-
-    return ReadDataStream(BytesIO(content))
-
-
-class Record(NamedTuple):
-    """Where a record, its content and its end are in a file, or in a chunk."""
-
-    opcode: int
-    start: int
-    content: int
-    end: int
-
-
-class MessageHeader(NamedTuple):
-    """What a message record says ahead of its data."""
-
-    channel: int
-    sequence: int
-    log_time_ns: int
-    publish_time_ns: int
-
-
-def message_header(container: bytes, content: int = 0) -> MessageHeader:
-    """Return the header of the message whose content begins at a byte of the container."""
-    return MessageHeader(*MESSAGE_HEAD.unpack_from(container, content))
-
-
-def message_header_at(container: bytes, start: int) -> MessageHeader | None:
-    """Return the header of the message record at a byte of the container; None if none is."""
-    content = start + RECORD.size
-    if content > len(container):
-        return None
-    opcode, length = RECORD.unpack_from(container, start)
-    if opcode != MESSAGE or length < MESSAGE_HEAD.size or content + length > len(container):
-        return None
-    return message_header(container, content)
-
-
-def message_data(container: bytes, start: int) -> bytes | None:
-    """Return a copy of the data of the message record at a byte of the container; None if none is."""
-    content = start + RECORD.size
-    if content > len(container):
-        return None
-    opcode, length = RECORD.unpack_from(container, start)
-    if opcode != MESSAGE or length < MESSAGE_HEAD.size or content + length > len(container):
-        return None
-    return container[content + MESSAGE_HEAD.size : content + length]
 
 
 def check_description(record: Record) -> None:
@@ -297,121 +214,3 @@ def _channel(described: _Described, schema: _Schema | None, *, is_copied: bool) 
         problem = f"its maps are encoded as '{encoding}'; {' or '.join(ENCODINGS)} is read: convert the recording"
         return Channel(topic, msgtype, encoding, problem)
     return Channel(topic, msgtype, encoding)
-
-
-@dataclass(frozen=True, slots=True)
-class MessageIndex:
-    """How many messages of a channel a chunk has; ``at`` is where in the file that says when and where they are."""
-
-    file: BinaryIO
-    channel: int
-    count: int
-    at: int
-    end: int
-
-    def rows(self) -> Iterator[tuple[int, int]]:
-        """Yield time and place in the chunk of each message, of which few are in memory at a time."""
-        at, stop = self.at, self.at + self.count * _INDEX_ROW.size
-        while at < stop:
-            self.file.seek(at)
-            block = self.file.read(min(_INDEX_BLOCK_BYTES, stop - at))
-            yield from _INDEX_ROW.iter_unpack(block)
-            at += len(block)
-
-
-@dataclass(frozen=True, slots=True)
-class RecordFile:
-    """An open MCAP file.
-
-    Parameters
-    ----------
-    written
-        Where the zeros begin with which the file ends, as space does that was reserved and never written; ``size`` if
-        there are none.
-    most_bytes
-        The largest message, or decompressed chunk, that is read.
-    """
-
-    path: Path
-    file: BinaryIO
-    size: int
-    written: int
-    most_bytes: int
-
-    def head_at(self, start: int, content_bytes: int = 0) -> tuple[Record, bytes] | None:
-        """Return what the bytes at ``start`` are as a record, and the bytes behind its header.
-
-        It may reach beyond the file. None if there are not even enough bytes for a header.
-        """
-        if not 0 <= start <= self.size - RECORD.size:
-            return None
-        self.file.seek(start)
-        head = self.file.read(RECORD.size + content_bytes)
-        opcode, length = RECORD.unpack_from(head)
-        content = start + RECORD.size
-        return Record(opcode, start, content, content + length), head[RECORD.size :]
-
-    def is_whole(self, record: Record) -> bool:
-        """Tell whether all of a record is there.
-
-        A record that ends among the zeros with which a file ends may have zeros in it that were never written.
-        """
-        # There is no record of type 0: such bytes were reserved for a recording and never written.
-        return record.opcode != 0 and (record.end <= self.written or record.end == self.size)
-
-    def record_at(self, start: int) -> Record | None:
-        """Return the record that begins at a byte of the file; None if no whole record does."""
-        found = self.head_at(start)
-        return found[0] if found and self.is_whole(found[0]) else None
-
-    def end_of(self, start: int) -> int:
-        """Return where the record ends that begins at a byte of the file; that byte if none does."""
-        record = self.record_at(start)
-        return record.end if record else start
-
-    def content(self, record: Record) -> bytes:
-        """Return a record's content."""
-        self.file.seek(record.content)
-        return self.file.read(record.end - record.content)
-
-    def record_bytes(self, start: int) -> bytes:
-        """Return a whole record; nothing if none begins at this byte, or one that is too large."""
-        record = self.record_at(start)
-        if record is None or record.end - start > self.most_bytes:
-            return b""
-        self.file.seek(start)
-        return self.file.read(record.end - start)
-
-    def message_header(self, record: Record) -> MessageHeader:
-        """Return the header of a message that lies outside of any chunk."""
-        self.file.seek(record.content)
-        return message_header(self.file.read(MESSAGE_HEAD.size))
-
-    def message_index(self, start: int, most: int | None = None) -> MessageIndex | None:
-        """Return the message index at a byte; None if none is there, or one of more messages than ``most``."""
-        found = self.head_at(start, _INDEX_HEAD.size)
-        if found is None or found[0].opcode != MESSAGE_INDEX or not self.is_whole(found[0]):
-            return None
-        record, head = found
-        if record.end - record.content < _INDEX_HEAD.size:
-            return None
-        channel, length = _INDEX_HEAD.unpack(head)
-        at = record.content + _INDEX_HEAD.size
-        count, rest = divmod(length, _INDEX_ROW.size)
-        if rest or at + length > record.end or (most is not None and count > most):
-            return None
-        return MessageIndex(self.file, channel, count, at, record.end)
-
-
-def written_bytes(file: BinaryIO, size: int) -> int:
-    """Return where the zeros begin with which a file ends; its size if there are only a few, which may be data."""
-    end = size
-    while end > 0:
-        start = max(0, end - _BLOCK_BYTES)
-        file.seek(start)
-        kept = len(file.read(end - start).rstrip(b"\0"))
-        if kept:
-            end = start + kept
-            break
-        end = start
-    return end if size - end >= _LEAST_UNWRITTEN_BYTES else size

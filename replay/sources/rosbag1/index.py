@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from replay.sources.boundary import COMMON, OF_LIBRARIES
-from replay.sources.rosbag1_chunks import ChunkPlace
-from replay.sources.rosbag1_records import CHUNK, CHUNK_INFO, CONNECTION, Record, index_rows, record_of
-from replay.sources.rosbag1_scan import BagFile, Entry, Topic, index_section
+from replay.sources.rosbag1.chunks import ChunkPlace
+from replay.sources.rosbag1.records import CHUNK, CHUNK_INFO, CONNECTION, Record, index_rows, record_of
+from replay.sources.rosbag1.scan import BagFile, Entry, Topic, index_section
 
 if TYPE_CHECKING:
-    from replay.sources.rosbag1_lean import LeanReader
+    from replay.sources.rosbag1.lean import LeanReader
 
 
 class UnusableIndexError(Exception):
@@ -97,7 +97,7 @@ def read_index(path: Path, file: BagFile, header: Record) -> Index:
 def _opened(path: Path) -> Iterator[LeanReader]:
     from rosbags.rosbag1 import ReaderError
 
-    from replay.sources.rosbag1_lean import LeanReader
+    from replay.sources.rosbag1.lean import LeanReader
 
     reader = LeanReader(path)
     try:

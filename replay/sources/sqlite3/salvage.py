@@ -19,7 +19,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from typing import BinaryIO, NamedTuple
 
-from replay.sources.sqlite3_places import Places
+from replay.sources.sqlite3.places import Places
 
 _LEAF, _INTERIOR = 0x0D, 0x05
 _HEADER_BYTES = 100

@@ -20,8 +20,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from struct import Struct
 
-from replay.sources.mcap_chunk import CHUNK_HEAD_BYTES, is_consistent, seems_a_chunk
-from replay.sources.mcap_records import (
+from replay.sources.mcap.chunk import CHUNK_HEAD_BYTES, is_consistent, seems_a_chunk
+from replay.sources.mcap.record_file import RecordFile
+from replay.sources.mcap.records import (
     ATTACHMENT,
     ATTACHMENT_INDEX,
     CHANNEL,
@@ -41,7 +42,6 @@ from replay.sources.mcap_records import (
     STATISTICS,
     SUMMARY_OFFSET,
     Record,
-    RecordFile,
     message_header,
 )
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
-from itertools import chain
 from pathlib import Path
 from typing import ClassVar
 
@@ -13,32 +12,22 @@ from replay.errors import InputError
 from replay.skip_cause import SkipCause
 from replay.sources.base import Encoding, RawMessage, SourceInfo
 from replay.sources.boundary import TEXT_MODE, Closing, translated
-from replay.sources.chunks import ChunkCache
 from replay.sources.lapses import lapse_of
 from replay.sources.losses import Loss, Losses
-from replay.sources.mcap_chunk import BadPart, chunk_content, cut_chunk_content
-from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, indexed_entries, read_summary
-from replay.sources.mcap_records import (
-    CHUNK,
-    MAGIC,
-    Channel,
-    RecordFile,
-    foreign_errors,
-    message_data,
-    message_header_at,
-    written_bytes,
-)
-from replay.sources.mcap_scan import Scan, chunk_loss, indexed_counts, scan, unknown_types
+from replay.sources.mcap.channels import Channel
+from replay.sources.mcap.chunk import BadPart
+from replay.sources.mcap.chunk_reader import ChunkReader, IndexLiesError
+from replay.sources.mcap.index import NO_CHUNK, Entry, indexed_entries
+from replay.sources.mcap.record_file import RecordFile, written_bytes
+from replay.sources.mcap.records import MAGIC, foreign_errors
+from replay.sources.mcap.scan import Scan, chunk_loss, indexed_counts, scan, unknown_types
+from replay.sources.mcap.summary import Contents, read_summary
 from replay.sources.memory import MOST_BYTES, TooLargeError
 from replay.sources.topics import ENCODINGS, topic_table
 from replay.sources.zstd import ZstdError, decompressed_cdr
 
 # What is left of the magic bytes after line endings were converted, or bytes that are no text were replaced.
 _MAGIC_IN_TEXT_MODE = (b"\x89MCAP0\n", b"\x89MCAP0\r\r\n", b"\xef\xbf\xbdMCAP0")
-
-
-class _IndexLies(Exception):
-    """An index says something else than is there."""
 
 
 class McapFile(Closing):
@@ -109,20 +98,20 @@ class McapFile(Closing):
                     for entry, message in self._read(entries, self._wanted(topics), self._claimed(entries)):
                         done.append(entry)
                         yield message
-                except _IndexLies:
+                except IndexLiesError:
                     self._distrust_index()
                 else:
                     return
             known = self._passed_through(topics)
             wanted = self._wanted(topics, known.contents)
             left = self._in_order_after(done, [each for each in known.entries if each.channel in wanted])
-            for _, message in self._read(left, wanted, _Chunks(self._file, left, cut_chunk=known.cut_chunk)):
+            for _, message in self._read(left, wanted, ChunkReader(self._file, left, cut_chunk=known.cut_chunk)):
                 yield message
 
-    def _claimed(self, entries: Collection[Entry]) -> _Chunks:
+    def _claimed(self, entries: Collection[Entry]) -> ChunkReader:
         chunks = self._summary.chunks if self._summary else ()
         begins_ns = {chunk.chunk_start_offset: chunk.message_start_time for chunk in chunks}
-        return _Chunks(self._file, entries, begins_ns)
+        return ChunkReader(self._file, entries, begins_ns)
 
     def _in_order_after(self, done: Collection[Entry], entries: Collection[Entry]) -> list[Entry]:
         """Return the entries that are not done; those before what is done already are named and left out.
@@ -200,7 +189,7 @@ class McapFile(Closing):
         self._contents = self._scanned().contents
 
     def _read(
-        self, entries: Iterable[Entry], wanted: Mapping[int, Channel], chunks: _Chunks
+        self, entries: Iterable[Entry], wanted: Mapping[int, Channel], chunks: ChunkReader
     ) -> Iterator[tuple[Entry, RawMessage]]:
         """Yield the messages at these places; what turns out to be damaged is left out and named."""
         times_ns = _times_ns(entries)
@@ -224,7 +213,7 @@ class McapFile(Closing):
                     continue
             yield entry, RawMessage(channel.topic, channel.msgtype, encoding, entry.log_time_ns, data)
 
-    def _check(self, chunks: _Chunks, block: int, times_ns: tuple[int, int]) -> None:
+    def _check(self, chunks: ChunkReader, block: int, times_ns: tuple[int, int]) -> None:
         try:
             chunks.check(block)
         except BadPart as error:
@@ -233,101 +222,6 @@ class McapFile(Closing):
     def _chunk_loss(self, block: int, error: BadPart, times_ns: tuple[int, int]) -> Loss:
         lost = indexed_counts(self._file, self._file.end_of(block))
         return replace(chunk_loss(block, error, lost, self._contents.channels), lapse=lapse_of(times_ns))
-
-
-class _Chunks:
-    """The messages of a file, of which a few chunks are held at a time.
-
-    Parameters
-    ----------
-    entries
-        The messages that will be asked for, once each.
-    begins_ns
-        When the first message of each chunk was recorded, if only indexes say what is in the chunks; else None. What
-        they claim is checked when a chunk is loaded. No message of a later time may be used before that, because a
-        claim that is wrong may hide an earlier one.
-    cut_chunk
-        The chunk at which the file was cut off.
-    """
-
-    def __init__(
-        self,
-        file: RecordFile,
-        entries: Collection[Entry],
-        begins_ns: Mapping[int, int] | None = None,
-        cut_chunk: int | None = None,
-    ) -> None:
-        self._file = file
-        self._cut_chunk = cut_chunk
-        self._bad: set[int] = set()
-        self._claims: dict[int, list[Entry]] = {}
-        for entry in () if begins_ns is None else entries:
-            self._claims.setdefault(entry.block, []).append(entry)
-        begins = ((begin_ns, block) for block, begin_ns in (begins_ns or {}).items() if block in self._claims)
-        self._unchecked = sorted(begins, reverse=True)
-        # a chunk is asked for once for each of its messages, and once to be checked
-        inside = (entry.block for entry in entries if entry.inner != NO_CHUNK)
-        uses = chain(inside, (block for _, block in self._unchecked))
-        self._held = ChunkCache(self._loaded, uses, file.most_bytes)
-
-    def begun(self, time_ns: int) -> Iterator[int]:
-        """Yield the chunks that begin by this time, each once."""
-        while self._unchecked and self._unchecked[-1][0] <= time_ns:
-            yield self._unchecked.pop()[1]
-
-    def check(self, block: int) -> None:
-        """Hold what is claimed of a chunk against what is in it.
-
-        Raises
-        ------
-        BadPart
-            If it is found to be bad.
-        """
-        if block not in self._bad:
-            self._content(block)
-
-    def data(self, entry: Entry) -> bytes | None:
-        """Return the data of a message; None if it is in a chunk that is known to be bad.
-
-        Raises
-        ------
-        BadPart
-            If its chunk is found to be bad.
-        """
-        if entry.inner == NO_CHUNK:
-            return self._checked(self._file.record_bytes(entry.block), 0)
-        if entry.block in self._bad:
-            return None
-        return self._checked(self._content(entry.block), entry.inner)
-
-    def _content(self, block: int) -> bytes:
-        try:
-            return self._held[block]
-        except BadPart:
-            self._bad.add(block)
-            raise
-
-    def _checked(self, container: bytes, start: int) -> bytes:
-        """Return the data of the message that was found at a byte before."""
-        data = message_data(container, start)
-        if data is None:
-            raise ValueError("it changed while it was read")
-        return data
-
-    def _loaded(self, start: int) -> bytes:
-        """Return what is in a chunk."""
-        if start == self._cut_chunk:
-            return cut_chunk_content(self._file, start)
-        claims = self._claims.get(start, ())
-        record = self._file.record_at(start)
-        if claims and (record is None or record.opcode != CHUNK):
-            raise _IndexLies
-        content, _ = chunk_content(self._file, start)
-        for entry in claims:
-            header = message_header_at(content, entry.inner)
-            if header is None or header.channel != entry.channel or header.log_time_ns != entry.log_time_ns:
-                raise _IndexLies
-        return content
 
 
 def _are_maps(channels: Mapping[int, Channel]) -> bool:

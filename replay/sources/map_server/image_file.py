@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from replay.errors import InputError
-from replay.sources.map_image import Pixels
+from replay.sources.map_server.map_image import Pixels
 
 MOST_PIXELS = 1 << 28
 MOST_BYTES = 1 << 30

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rosbags.rosbag1 import Reader, ReaderError
 
-from replay.sources.rosbag1_records import INDEX, index_rows, record_of
+from replay.sources.rosbag1.records import INDEX, index_rows, record_of
 
 if TYPE_CHECKING:
     from rosbags.rosbag1.reader import IndexData

@@ -16,17 +16,8 @@ from io import BytesIO
 from typing import NamedTuple
 
 from replay.skip_cause import SkipCause
-from replay.sources.mcap_records import (
-    CHANNEL,
-    CHUNK,
-    MESSAGE,
-    MESSAGE_HEAD,
-    RECORD,
-    SCHEMA,
-    Record,
-    RecordFile,
-    message_header,
-)
+from replay.sources.mcap.record_file import RecordFile
+from replay.sources.mcap.records import CHANNEL, CHUNK, MESSAGE, MESSAGE_HEAD, RECORD, SCHEMA, Record, message_header
 from replay.sources.memory import over_memory
 
 _HEAD = struct.Struct("<QQQII")

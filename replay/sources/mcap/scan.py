@@ -19,7 +19,8 @@ from replay.skip_cause import SkipCause
 from replay.sources.boundary import COPY_AGAIN
 from replay.sources.lapses import AT_END, Place, Written, lapse_of
 from replay.sources.losses import Loss
-from replay.sources.mcap_chunk import (
+from replay.sources.mcap.channels import Channel, ChannelTable, check_description
+from replay.sources.mcap.chunk import (
     BadPart,
     Inside,
     chunk_content,
@@ -28,24 +29,22 @@ from replay.sources.mcap_chunk import (
     inner_records,
     inside_of,
 )
-from replay.sources.mcap_index import NO_CHUNK, Contents, Entry, Summary, file_crc, statistics_between
-from replay.sources.mcap_records import (
+from replay.sources.mcap.index import NO_CHUNK, Entry
+from replay.sources.mcap.record_file import RecordFile, file_crc
+from replay.sources.mcap.records import (
     CHANNEL,
     CHUNK,
     HEADER,
     MAGIC,
     MESSAGE,
     SCHEMA,
-    Channel,
-    ChannelTable,
     MessageHeader,
     Record,
-    RecordFile,
-    check_description,
     message_header,
     message_header_at,
 )
-from replay.sources.mcap_walk import Walk
+from replay.sources.mcap.summary import Contents, Summary, statistics_between
+from replay.sources.mcap.walk import Walk
 from replay.sources.memory import over_memory
 from replay.words import counted
 

@@ -23,9 +23,9 @@ from replay.codec import encode_grid
 from replay.errors import InputError
 from replay.sources.base import GRID_TYPE, RawMessage, SourceInfo, TopicInfo
 from replay.sources.boundary import COMMON, Closing, translated
-from replay.sources.image_file import read_pixels
 from replay.sources.losses import Losses
-from replay.sources.map_image import Mode, Thresholds, cells_from_pixels
+from replay.sources.map_server.image_file import read_pixels
+from replay.sources.map_server.map_image import Mode, Thresholds, cells_from_pixels
 from replay.sources.memory import MOST_BYTES
 from replay.sources.yaml_text import load_yaml
 

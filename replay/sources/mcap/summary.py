@@ -1,7 +1,7 @@
-"""Where the messages of an MCAP file are, from its summary: which chunks hold which channels, and where in them.
+"""What the summary of an MCAP file says: which channels there are, how many messages, and which chunks hold which.
 
 The summary serves where it is complete. Any of its parts may be missing, and messages may lie outside of chunks, where
-no index finds them; then `replay.sources.mcap_scan` passes through the file instead.
+no index finds them; then `replay.sources.mcap.scan` passes through the file instead.
 """
 
 from __future__ import annotations
@@ -9,26 +9,21 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Collection, Mapping
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from replay.sources.mcap_chunk import BadPart, inner_records
-from replay.sources.mcap_records import (
+from replay.sources.mcap.channels import NO_SCHEMA, Channel, ChannelTable, check_description
+from replay.sources.mcap.chunk import BadPart, inner_records
+from replay.sources.mcap.record_file import RecordFile, file_crc
+from replay.sources.mcap.records import (
     CHANNEL,
     CHUNK_INDEX,
     DATA_END,
     FOOTER,
     MAGIC,
-    MESSAGE_HEAD,
-    NO_SCHEMA,
     RECORD,
     SCHEMA,
     STATISTICS,
-    Channel,
-    ChannelTable,
-    RecordFile,
-    check_description,
     foreign_errors,
     parser_stream,
 )
@@ -36,26 +31,8 @@ from replay.sources.mcap_records import (
 if TYPE_CHECKING:
     from mcap.records import ChunkIndex, Statistics
 
-NO_CHUNK = -1
-
 _FOOTER = struct.Struct("<BQQQI")
-_CHUNK_TIMES = struct.Struct("<QQ")
 _DATA_END_BYTES = RECORD.size + 4
-_LEAST_MESSAGE_BYTES = RECORD.size + MESSAGE_HEAD.size
-_BLOCK_BYTES = 1 << 20
-
-
-class Entry(NamedTuple):
-    """Where a message is; sorts by time, then as written.
-
-    ``block`` is the byte of the file at which its chunk begins and ``inner`` its byte in the decompressed chunk; of a
-    message outside of chunks, its own byte and `NO_CHUNK`.
-    """
-
-    log_time_ns: int
-    block: int
-    inner: int
-    channel: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,16 +175,6 @@ def _summary_section(file: RecordFile) -> tuple[bytes, bool] | None:
     return file.file.read(stop - start), crc != 0
 
 
-def file_crc(file: RecordFile, start: int, stop: int) -> int:
-    """Return the checksum of bytes of a file."""
-    crc = 0
-    file.file.seek(start)
-    while start < stop and (block := file.file.read(min(_BLOCK_BYTES, stop - start))):
-        crc = zlib.crc32(block, crc)
-        start += len(block)
-    return crc
-
-
 def _is_complete(statistics: Statistics, channels: Mapping[int, Channel], chunks: Collection[ChunkIndex]) -> bool:
     counts = statistics.channel_message_counts
     return (
@@ -216,60 +183,3 @@ def _is_complete(statistics: Statistics, channels: Mapping[int, Channel], chunks
         and counts.keys() <= channels.keys()
         and all(channel.problem != NO_SCHEMA for channel in channels.values())
     )
-
-
-def indexed_entries(file: RecordFile, summary: Summary, wanted: AbstractSet[int]) -> tuple[Entry, ...] | None:
-    """Return where the messages of these channels are, sorted, as the message indexes say.
-
-    No checksum covers these. What the summary, and chunks themselves, say in their place is held against them.
-
-    Returns
-    -------
-    tuple of Entry
-        None if the indexes do not find just as many messages as the statistics count, or one of them twice, or at
-        times or places that their chunk does not have.
-    """
-    counts = summary.statistics.channel_message_counts if summary.statistics else {}
-    left = {channel: counts.get(channel, 0) for channel in wanted}
-    entries: list[Entry] = []
-    for chunk in summary.chunks:
-        asked = wanted & chunk.message_index_offsets.keys()
-        if asked and not (summary.is_checked or _has_these_times(file, chunk)):
-            return None
-        for channel in sorted(asked):
-            most = min(left[channel], _most_messages(file, chunk))
-            found = _message_index(file, chunk, channel, most)
-            if found is None:
-                return None
-            left[channel] -= len(found)
-            entries += found
-    if any(left.values()) or len({(entry.block, entry.inner) for entry in entries}) < len(entries):
-        return None
-    return tuple(sorted(entries))
-
-
-def _has_these_times(file: RecordFile, chunk: ChunkIndex) -> bool:
-    """Tell whether a chunk says of its times what the summary does."""
-    found = file.head_at(chunk.chunk_start_offset, _CHUNK_TIMES.size)
-    said = chunk.message_start_time, chunk.message_end_time
-    return found is not None and len(found[1]) == _CHUNK_TIMES.size and _CHUNK_TIMES.unpack(found[1]) == said
-
-
-def _most_messages(file: RecordFile, chunk: ChunkIndex) -> int:
-    """Return how many messages a chunk has room for."""
-    return int(min(chunk.uncompressed_size, file.most_bytes) // _LEAST_MESSAGE_BYTES)
-
-
-def _message_index(file: RecordFile, chunk: ChunkIndex, channel: int, most: int) -> list[Entry] | None:
-    """Return the entries of one message index; None if it is not there, or not of this chunk."""
-    found = file.message_index(chunk.message_index_offsets[channel], most)
-    if found is None or found.channel != channel:
-        return None
-    first_ns, last_ns = chunk.message_start_time, chunk.message_end_time
-    last_place = chunk.uncompressed_size - _LEAST_MESSAGE_BYTES
-    entries = []
-    for log_time_ns, inner in found.rows():
-        if not first_ns <= log_time_ns <= last_ns or inner > last_place:
-            return None
-        entries.append(Entry(log_time_ns, chunk.chunk_start_offset, inner, channel))
-    return entries

@@ -13,14 +13,14 @@ from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE, RawMessage, SourceInfo
 from replay.sources.boundary import COMMON, COPY_AGAIN, TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
-from replay.sources.definitions import differing_field
+from replay.sources.definitions.difference import differing_field
 from replay.sources.lapses import AT_END, lapse_of
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import MOST_BYTES
-from replay.sources.rosbag1_chunks import Chunk, read_chunk, records_in
-from replay.sources.rosbag1_index import Index, UnusableIndexError, read_index
-from replay.sources.rosbag1_records import BAG_HEADER, CONNECTION, MESSAGE, Record, record_in, record_of
-from replay.sources.rosbag1_scan import BagFile, Contents, Entry, Scan
+from replay.sources.rosbag1.chunks import Chunk, read_chunk, records_in
+from replay.sources.rosbag1.index import Index, UnusableIndexError, read_index
+from replay.sources.rosbag1.records import BAG_HEADER, CONNECTION, MESSAGE, Record, record_in, record_of
+from replay.sources.rosbag1.scan import BagFile, Contents, Entry, Scan
 from replay.sources.topics import topic_table
 
 _MAGIC = b"#ROSBAG V"

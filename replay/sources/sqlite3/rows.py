@@ -14,8 +14,8 @@ from replay.sources.boundary import COPY_AGAIN
 from replay.sources.lapses import AT_END, LATEST, Lapse, Written
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import TooLargeError
-from replay.sources.sqlite3_places import Places, own_places, told_places
-from replay.sources.sqlite3_salvage import (
+from replay.sources.sqlite3.places import Places, own_places, told_places
+from replay.sources.sqlite3.salvage import (
     BadPageError,
     Cell,
     Gap,

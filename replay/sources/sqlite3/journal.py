@@ -11,7 +11,7 @@ from typing import BinaryIO
 from replay.skip_cause import SkipCause
 from replay.sources.lapses import AT_END
 from replay.sources.losses import Loss, Losses
-from replay.sources.sqlite3_log import PageLog, is_page_length
+from replay.sources.sqlite3.log import PageLog, is_page_length
 
 _HEAD = struct.Struct(">8sIIIII")
 _MAGIC = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"

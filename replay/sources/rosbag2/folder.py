@@ -18,11 +18,11 @@ from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.compressed_file import head_of, name_early_end, plain_copy, too_early
 from replay.sources.lapses import AT_END, Lapse, Written
 from replay.sources.losses import Loss, Losses, place_in
-from replay.sources.mcap_file import McapFile
-from replay.sources.mcap_scan import Scan
+from replay.sources.mcap.file import McapFile
+from replay.sources.mcap.scan import Scan
 from replay.sources.memory import MOST_BYTES
-from replay.sources.rosbag2_metadata import METADATA, Parts, listed_parts, numbered_parts
-from replay.sources.sqlite3_file import Sqlite3File
+from replay.sources.rosbag2.metadata import METADATA, Parts, listed_parts, numbered_parts
+from replay.sources.sqlite3.file import Sqlite3File
 from replay.sources.topics import topic_table
 from replay.sources.zstd import ZstdError
 

@@ -10,7 +10,7 @@ from typing import BinaryIO, Protocol
 
 from replay.skip_cause import SkipCause
 from replay.sources.memory import MOST_BYTES, over_memory
-from replay.sources.rosbag1_records import CONNECTION, INDEX, MESSAGE, Record, find_in, is_unfinished, record_in
+from replay.sources.rosbag1.records import CONNECTION, INDEX, MESSAGE, Record, find_in, is_unfinished, record_in
 
 # What a decompressor is given and what it returns at once: a block of bz2 that takes 50 bytes may hold 46 MB.
 _BZ2_BYTES = 1 << 12

@@ -14,7 +14,7 @@ from replay.skip_cause import SkipCause
 from replay.sources.boundary import COPY_AGAIN
 from replay.sources.lapses import AT_END
 from replay.sources.losses import Loss, Losses
-from replay.sources.sqlite3_log import PageLog, is_page_length
+from replay.sources.sqlite3.log import PageLog, is_page_length
 
 _HEAD = struct.Struct(">IIIIIIII")
 _FRAME_HEAD = struct.Struct(">IIIIII")

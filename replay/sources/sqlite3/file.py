@@ -18,13 +18,13 @@ from replay.errors import InputError
 from replay.skip_cause import SkipCause
 from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE, RawMessage, SourceInfo
 from replay.sources.boundary import COMMON, Closing, translated
-from replay.sources.definitions import differing_field
+from replay.sources.definitions.difference import differing_field
 from replay.sources.lapses import Lapse, lapse_of
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import MOST_BYTES, TooLargeError
-from replay.sources.sqlite3_beside import beside, plain_file
-from replay.sources.sqlite3_rows import BadRowError, BagTables, NoBagError, Record, Row, SqliteTables, salvaged_tables
-from replay.sources.sqlite3_salvage import read_header
+from replay.sources.sqlite3.beside import beside, plain_file
+from replay.sources.sqlite3.rows import BadRowError, BagTables, NoBagError, Record, Row, SqliteTables, salvaged_tables
+from replay.sources.sqlite3.salvage import read_header
 from replay.sources.topics import normalised_type, topic_table, type_in
 from replay.sources.zstd import ZstdError, decompressed_cdr
 

@@ -1,0 +1,1 @@
+"""ROS 1 bags: `file` reads them by `index` or, where there is none that serves, by `scan`."""
