@@ -14,8 +14,8 @@ from replay.options import TimeBound
 from replay.report import SCHEMA
 from replay.sources.base import Encoding
 from replay.sources.boundary import translated
-from replay.sources.mcap_file import McapFile
-from replay.sources.mcap_records import MAGIC
+from replay.sources.mcap.file import McapFile
+from replay.sources.mcap.records import MAGIC
 from replay.topics import REPORT_TOPIC
 
 MOST_BYTES = 256 << 20

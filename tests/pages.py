@@ -56,7 +56,7 @@ class Page:
 
     def rows(self, name: str) -> list[list[str]]:
         """Return the cells of a section's tables, row by row, without the head."""
-        bodies = [each for each in self.section(name).iter("tbody")]
+        bodies = list(self.section(name).iter("tbody"))
         return [[" ".join("".join(_texts(cell)).split()) for cell in row] for body in bodies for row in body.iter("tr")]
 
     def attributes(self) -> Iterator[tuple[str, str, str]]:

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from replay.errors import OutputError
-from replay.sources.map_image import Pixels
+from replay.sources.map_server.map_image import Pixels
 
 
 def png(pixels: Pixels) -> bytes:

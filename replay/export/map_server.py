@@ -19,7 +19,7 @@ import numpy as np
 from mapmerge.grid import MAX_PERCENT, Cells, Grid
 from replay.errors import OutputError
 from replay.export.image import png
-from replay.sources.map_image import Pixels
+from replay.sources.map_server.map_image import Pixels
 
 OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.196
 FROM_PERCENT, UP_TO_PERCENT = 65, 25

@@ -165,7 +165,7 @@ def test_errors_say_which_setting_and_what_was_expected(replay: Program, tmp_pat
         (("--config", str(SAMPLE)), f"{SAMPLE}: it holds no /merged/report"),
         (
             ("--config", str(ROOT / "docs/report.schema.json")),
-            f"{ROOT / 'docs/report.schema.json'}: this is JSON of something else",
+            f"{ROOT}/docs/report.schema.json: this is JSON",
         ),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -39,7 +40,7 @@ def test_of_a_long_run_evenly_chosen_ones_are_kept_and_the_last(ticks: int, robo
     stamps = series.stamps_ns
     assert series.ticks == ticks
     assert (stamps[0], stamps[-1]) == (0, (ticks - 1) * 10)
-    steps = {after - before for before, after in zip(stamps[:-1], stamps[1:-1], strict=False)}
+    steps = {after - before for before, after in pairwise(stamps[:-1])}
     assert len(steps) == 1
     assert len(stamps) >= 100
     assert len(stamps) * robots * 6 <= 2 * MOST_NUMBERS + 6 * robots
