@@ -1,0 +1,44 @@
+"""Write the last picture of each step of the method, as a run's MCAP holds them, as PNG files.
+
+python scripts/step_pictures.py OUT.mcap ROBOT FOLDER [--prefix NAME]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+from rosbags.highlevel import AnyReader
+
+from replay.topics import IMAGE_TOPICS
+
+
+def main() -> int:
+    """Write the pictures of one robot."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("mcap", type=Path, metavar="OUT.mcap")
+    parser.add_argument("robot")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--prefix", default="", help="what the files' names begin with")
+    arguments = parser.parse_args()
+    last: dict[str, np.ndarray] = {}
+    topics = f"{IMAGE_TOPICS}/{arguments.robot}/"
+    with AnyReader([arguments.mcap]) as reader:
+        wanted = [item for item in reader.connections if item.topic.startswith(topics)]
+        for connection, _, data in reader.messages(wanted):
+            message = reader.deserialize(data, connection.msgtype)
+            pixels = np.asarray(message.data).reshape(message.height, message.width, 3)
+            last[connection.topic.removeprefix(topics)] = pixels
+    if not last:
+        parser.error(f"{arguments.mcap}: there are no pictures of {arguments.robot}")
+    for step, pixels in last.items():
+        path = arguments.folder / f"{arguments.prefix}{step}.png"
+        cv2.imwrite(str(path), cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
