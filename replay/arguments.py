@@ -124,7 +124,9 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
         options = command_parser(given[0]).parsed(given[1:])
         options.command = given[0]
         return options
-    _program().parse_args(given[:1])
+    program = _program()
+    program.add_argument("command", nargs="?", help=argparse.SUPPRESS)
+    program.parse_args(given[:1])
     raise UsageError(_no_command(given))
 
 
@@ -141,11 +143,22 @@ def command_parser(name: str) -> Parser:
     return parser
 
 
+def whole_parser() -> tuple[Parser, list[Parser]]:
+    """Return the parser of all commands together, for what looks at all of them, and that of each."""
+    program = _program()
+    commands = program.add_subparsers(dest="command", parser_class=Parser)
+    parsers = []
+    for name, row in COMMANDS.items():
+        parser = commands.add_parser(name, help=row.summary, prog=f"replay {name}", description=row.summary)
+        load(name).add_flags(parser)
+        parsers.append(parser)
+    return program, parsers
+
+
 def _program() -> Parser:
     """Return the parser of what stands before a command."""
     program = Parser(prog="replay", usage="replay COMMAND ...", description=_listing(), epilog=_EXAMPLES)
     program.add_argument("--version", action="version", version=f"replay {__version__}", help="print the version")
-    program.add_argument("command", nargs="?", help=argparse.SUPPRESS)
     return program
 
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from replay.events import Report
 from replay.options import OutputOptions, RunOptions
 from replay.sinks.base import Sink
-from replay.sinks.terminal import Narrator, ProgressSink, open_notes
+from replay.sinks.terminal import Narrator, ProgressSink, Talk, open_notes
 
 
 class Run:
@@ -20,13 +20,18 @@ class Run:
         What is read, and how it is merged.
     written
         What is written; None for nothing.
+    talk, colour
+        How much is said, and when in colours: ``auto``, ``always`` or ``never``.
     """
 
-    def __init__(self, options: RunOptions, written: OutputOptions | None) -> None:
+    def __init__(
+        self, options: RunOptions, written: OutputOptions | None, talk: Talk = Talk.USUAL, colour: str = "auto"
+    ) -> None:
         self._options = options
         self._written = written
-        self._notes = open_notes()
-        self.narrator = Narrator(self._notes, announce=options.robots is None)
+        self._talk = talk
+        self._notes = open_notes(colour)
+        self.narrator = Narrator(self._notes, announce=options.robots is None, talk=talk)
 
     def merge(self) -> Report:
         """Merge, and return the report.
@@ -58,7 +63,7 @@ class Run:
     def _sinks(self) -> Iterator[Sequence[Sink]]:
         from replay.sinks import open_sinks
 
-        shown = (ProgressSink(self._notes), self.narrator)
+        shown = (ProgressSink(self._notes, self._talk), self.narrator)
         if self._written is not None:
             with open_sinks(self._written, shown, say=self.narrator.say) as sinks:
                 yield sinks

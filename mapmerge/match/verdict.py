@@ -12,6 +12,7 @@ from mapmerge.match.cues import Cues, Fit
 from mapmerge.match.pair import DescribedMap, PairOfMaps
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
+from mapmerge.rounding import percent_below, rounded_down
 from mapmerge.verify import Scores, verify
 
 
@@ -22,7 +23,9 @@ def too_little_structure(target: DescribedMap, source: DescribedMap, config: Ver
         return Reason(ReasonCode.TOO_LITTLE_STRUCTURE, "one of the maps shows no wall at all")
     if least_m >= config.min_matched_wall_m:
         return None
-    message = f"one of the maps shows {_down(least_m, 1):.1f} m of wall, less than {config.min_matched_wall_m:g} m"
+    message = (
+        f"one of the maps shows {rounded_down(least_m, 1):.1f} m of wall, less than {config.min_matched_wall_m:g} m"
+    )
     return Reason(ReasonCode.TOO_LITTLE_STRUCTURE, message)
 
 
@@ -33,21 +36,18 @@ def lacking(scores: Scores, config: VerifyConfig) -> Reason | None:
         ("m of wall", scores.matched_wall_m, config.min_matched_wall_m, "m"),
     ):
         if found < least:
-            message = f"the maps share {_down(found, 1):.1f} {what}, less than {least:g} {unit}"
+            message = f"the maps share {rounded_down(found, 1):.1f} {what}, less than {least:g} {unit}"
             return Reason(ReasonCode.TOO_LITTLE_OVERLAP, message)
     if scores.wall_agreement < config.least_agreement:
-        floor = f"less than {config.least_agreement:.0%}"
-        message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree, {floor}"
+        agree, least_share = percent_below(scores.wall_agreement, config.least_agreement)
+        message = f"of the walls in the overlap {agree} agree, less than {least_share}"
         return Reason(ReasonCode.WALLS_DISAGREE, message)
     return None
 
 
 def held(scores: Scores, config: VerifyConfig) -> Reason:
     """Return whether a placement that was accepted still has what it must have."""
-    message = (
-        f"about {scores.overlap_m2:.0f} m² overlap, {_down(scores.wall_agreement, 2):.0%} of the walls there agree, "
-        "followed since it was found"
-    )
+    message = f"about {scores.overlap_m2:.0f} m² overlap, {_agreeing(scores)} there agree, followed since it was found"
     return lacking(scores, config) or Reason(ReasonCode.ACCEPTED, message)
 
 
@@ -66,7 +66,8 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig, o
     poor = lacking(scores, config)
     if poor is not None:
         return poor
-    doubt = f"the confidence is {_percent(confidence)}, less than {_percent(config.min_confidence)}"
+    sure, least_sure = percent_below(confidence, config.min_confidence)
+    doubt = f"the confidence is {sure}, less than {least_sure}"
     # of what is as good as refused already, that says nothing: strangers fit a little in many ways
     if other_half is not None and confidence >= config.witness_confidence:
         areas = f"on {other_half.overlap_m2:.0f} m² instead of {scores.overlap_m2:.0f} m²"
@@ -77,20 +78,19 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig, o
     rival = times_as_likely(-cues.contest.lead_log_odds)
     is_alone = cues.contest.lead_log_odds >= UNRIVALLED
     if confidence >= config.min_confidence:
-        message = (
-            f"{scores.overlap_m2:.0f} m² overlap, {_down(scores.wall_agreement, 2):.0%} of the walls there agree, "
-            + ("nothing else comes near" if is_alone else f"next best placement {_times(rival)} times as likely")
+        message = f"{scores.overlap_m2:.0f} m² overlap, {_agreeing(scores)} there agree, " + (
+            "nothing else comes near" if is_alone else f"next best placement {_times(rival)} times as likely"
         )
         return Reason(ReasonCode.ACCEPTED, message)
     if scores.score_m <= 0.0 or scores.wall_agreement < config.poor_agreement:
-        message = f"of the walls in the overlap {_down(scores.wall_agreement, 2):.0%} agree; {doubt}"
+        message = f"of the walls in the overlap {rounded_down(scores.wall_agreement, 2):.0%} agree; {doubt}"
         return Reason(ReasonCode.WALLS_DISAGREE, message)
     if rival > config.rival_likelihood and cues.contest.log_odds >= 0.0:
         message = f"another placement is {_times(rival)} times as likely as this one; {doubt}"
         return Reason(ReasonCode.AMBIGUOUS, message)
     message = (
         f"on {scores.overlap_m2:.0f} m² {scores.matched_wall_m:.0f} m of wall agree, "
-        f"{_down(scores.wall_agreement, 2):.0%} of what can be compared; {doubt}"
+        f"{rounded_down(scores.wall_agreement, 2):.0%} of what can be compared; {doubt}"
     )
     return Reason(ReasonCode.LOW_CONFIDENCE, message)
 
@@ -145,6 +145,10 @@ def _as_rival(elsewhere: Match, match: Match) -> Rival:
     return Rival(pose, scores.score_m, times_as_likely(difference), elsewhere.cues.fit)
 
 
+def _agreeing(scores: Scores) -> str:
+    return f"{rounded_down(scores.wall_agreement, 2):.0%} of the walls"
+
+
 def _times(likelihood: float) -> str:
     """Return how many times as likely something is, with as many digits as tell it from 0."""
     if likelihood < 0.001:
@@ -152,15 +156,3 @@ def _times(likelihood: float) -> str:
     if likelihood >= 1000.0:
         return "more than 1000"
     return f"{likelihood:.{3 if likelihood < 0.1 else 2 if likelihood < 10.0 else 0}f}"
-
-
-def _percent(share: float) -> str:
-    """Return a share near 1 with as many digits as tell it from 1."""
-    if share >= 0.99995:
-        return "over 99.99%"
-    return f"{_down(share * 100, 2 if share > 0.9 else 0 if share >= 0.01 else 2):g}%"
-
-
-def _down(value: float, digits: int) -> float:
-    """Round down, so that what is less than a limit reads like that."""
-    return math.floor(round(value * 10.0**digits, 9)) / 10.0**digits

@@ -62,6 +62,9 @@ COMMANDS: dict[str, Command] = {
     "check": Command("replay.commands.check", "in CI", "merge, and hold the outcome against what is expected"),
     "compare": Command("replay.commands.compare", "in CI", "list what differs between two runs"),
     "config": Command("replay.commands.config", "about replay", "print the settings that a run would have, as a file"),
+    "completion": Command(
+        "replay.commands.completion", "about replay", "print what a shell needs to complete commands and flags"
+    ),
 }
 """In the order in which they are listed."""
 

@@ -7,13 +7,11 @@ import sys
 from typing import TYPE_CHECKING
 
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE, interrupted_late
-from replay.flags import inputs, outputs, placing, rules
+from replay.flags import inputs, outputs, placing, rules, talk
 from replay.standard_streams import printing, takes
 
 if TYPE_CHECKING:
     from replay.events import Report
-    from replay.options import OutputOptions
-    from replay.sinks.terminal import Narrator
 
 USAGE = "RUN [RUN ...] [options]"
 DESCRIPTION = """\
@@ -39,6 +37,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     placing.add(parser)
     outputs.add(parser)
     rules.add_all(parser)
+    talk.add(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -47,13 +46,15 @@ def run(options: argparse.Namespace) -> int:
     written = outputs.output_options(options, run)
 
     from replay.run_merge import Run
+    from replay.sinks import output_paths
 
-    merging = Run(run, written)
+    merging = Run(run, written, talk.of(options), options.color)
     narrator = merging.narrator
     try:
         report = merging.merge()
         status = EXIT_DIFFERS if options.require_all and not _all_merged(report) else EXIT_DONE
-        _tell(report, written, narrator, as_json=options.json)
+        _print(report, options)
+        narrator.sum_up(report, [str(path) for path in output_paths(written).values()])
     except KeyboardInterrupt:
         if not narrator.is_published:
             raise
@@ -61,18 +62,18 @@ def run(options: argparse.Namespace) -> int:
     return status
 
 
-def _tell(report: Report, written: OutputOptions, narrator: Narrator, *, as_json: bool) -> None:
-    """Print what came of it, once it is all written."""
-    from replay.sinks import output_paths
+def _print(report: Report, options: argparse.Namespace) -> None:
+    """Print what was asked for of what came of it, once it is all written."""
     from replay.sinks.json_file import report_text
-    from replay.sinks.terminal import table_text
+    from replay.sinks.terminal_table import table_text
 
+    if options.quiet and not options.json:
+        return
     with printing():
-        text = report_text(report) if as_json else table_text(report)
-        if as_json and not takes(text):
+        text = report_text(report) if options.json else table_text(report, options.color)
+        if options.json and not takes(text):
             text = report_text(report, is_ascii=True)
         sys.stdout.write(text)
-    narrator.sum_up(report, [str(path) for path in output_paths(written).values()])
 
 
 def _all_merged(report: Report) -> bool:

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from replay.exit_status import EXIT_DONE, interrupted_late
+from replay.flags import talk
 from replay.flags.values import mcap_path
 from replay.plain_text import plain
 from replay.standard_streams import say
@@ -39,6 +40,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
         help="the new MCAP (default: FILE without .partial, or NAME.recovered.mcap in the current folder)",
     )
     parser.add_argument("--force", action="store_true", help="replace outputs that exist")
+    talk.add_quiet(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -48,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
     damaged, output = _paths(options)
     found = recover(damaged, output, force=options.force)
     try:
-        for line in found.lines():
+        for line in found.lines() if not options.quiet else ():
             say(f"replay: {plain(line)}")
     except KeyboardInterrupt:
         return interrupted_late()

@@ -20,7 +20,7 @@ SECTIONS: Mapping[str, str] = {
 }
 """Groups of flags that are settings → the section that they are in; "" for the top of the file."""
 
-OF_ONE_CALL = frozenset({"help", "config", "set", "force", "json", "view", "changed"})
+OF_ONE_CALL = frozenset({"help", "config", "set", "force", "json", "view", "changed", "quiet", "verbose", "color"})
 """Flags within these groups, and others, that say what to do this time, and are nobody's setting.
 
 What replaces files must be asked for each time, and what is shown is for whoever looks.

@@ -1,22 +1,23 @@
-"""What a person at the terminal sees: a progress bar on long work, and a table at the end."""
+"""What a person at the terminal sees while a run goes on: a progress bar, and a line for what is worth one."""
 
 from __future__ import annotations
 
-import math
-import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from enum import IntEnum
 from time import perf_counter
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING
 
+from mapmerge.rounding import rounded_down
+from replay.colours import are_on
 from replay.decisions import decisions
 from replay.events import Event, Merged, Noted, Report, Skipped, Started
 from replay.options import NS_PER_S
-from replay.plain_text import plain
+from replay.plain_text import listed, plain
 from replay.skip_cause import SkipCause
 from replay.sources.losses import part_of
 from replay.standard_streams import quiet_stderr
-from replay.words import counted, intention, lost, recovered, unused
+from replay.words import counted, intention, lost, moment, recovered, unused
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,13 +25,25 @@ if TYPE_CHECKING:
 
 _WIDTH_WHERE_NO_TERMINAL = 400
 _SKIPPED_NAMED = 5
-_STYLES = {"reference": "bold", "merged": "green", "unmerged": "yellow", "no_map": "red"}
+_LONGEST_RUN_S = 1e6
+"""Messages farther from the first map than this have a time that is not to be believed."""
+
+
+class Talk(IntEnum):
+    """How much is said."""
+
+    QUIET = 0
+    """Nothing."""
+    USUAL = 1
+    """What is worth a line."""
+    VERBOSE = 2
+    """What was done at each time, as well."""
 
 
 class ProgressSink:
-    """Shows how far the run is; on a terminal only."""
+    """Shows how far the run is; on a terminal only, and not between the lines of one that tells all."""
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, talk: Talk = Talk.USUAL) -> None:
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
         self._progress: Progress = Progress(
@@ -41,7 +54,7 @@ class ProgressSink:
             TimeRemainingColumn(),
             console=console,
             transient=True,
-            disable=not console.is_terminal,
+            disable=not console.is_terminal or talk is not Talk.USUAL,
         )
         self._task: TaskID | None = None
 
@@ -73,15 +86,18 @@ class Narrator:
     ----------
     announce
         Whether to say which robots were chosen.
+    talk
+        How much is said.
     """
 
-    def __init__(self, console: Console, *, announce: bool) -> None:
+    def __init__(self, console: Console, *, announce: bool, talk: Talk = Talk.USUAL) -> None:
         self.unused_topics: Sequence[str] = ()
         """Map topics that are no robot's."""
         self.is_published = False
         """Whether all files of the run have their final names."""
         self._console = console
         self._announce = announce
+        self._talk = talk
         self._begin_s = perf_counter()
         self._merge_s = 0.0
         self._render_s = 0.0
@@ -100,6 +116,10 @@ class Narrator:
         elif isinstance(event, Noted):
             self.say(f"{event.robot}: {event.message}" if event.robot else event.message)
         elif isinstance(event, Merged):
+            self._first_ns = event.stamp_ns if self._first_ns is None else self._first_ns
+            if self._talk is Talk.VERBOSE:
+                for line in told(event, self._after(event.stamp_ns)):
+                    self.say(line)
             self._say_decided(event)
             self._merge_s += event.timing.merge_s
             self._render_s += event.timing.render_s
@@ -107,17 +127,28 @@ class Narrator:
 
     def _say_decided(self, event: Merged) -> None:
         """Say what jumped, or was placed, moved or withdrawn, and when."""
-        self._first_ns = event.stamp_ns if self._first_ns is None else self._first_ns
-        after_s = (event.stamp_ns - self._first_ns) / NS_PER_S
         for _, words in decisions(event.result):
-            self.say(f"+{after_s:.1f} s: {words}")
+            self.say(f"{self._after(event.stamp_ns)}: {words}")
+
+    def _after(self, time_ns: int) -> str:
+        """Return how long after the first map a time is."""
+        first_ns = time_ns if self._first_ns is None else self._first_ns
+        return f"+{(time_ns - first_ns) / NS_PER_S:.1f} s"
 
     def _say_skipped(self, event: Skipped) -> None:
         """Name the first few of each cause; `sum_up` counts them all."""
         self._skipped[event.cause] += 1
         if self._skipped[event.cause] <= _SKIPPED_NAMED:
             what = "skipped a message" if event.messages == 1 else lost(event.messages)
-            self.say(f"{what} ({event.input}, {event.where}): {event.cause}: {event.detail}")
+            self.say(f"{what} ({event.input}, {self._where(event)}): {event.cause}: {event.detail}")
+
+    def _where(self, event: Skipped) -> str:
+        """Return where something was: a place, or a topic, the time, and how long after the first map that is."""
+        if event.place:
+            return event.place
+        after_s = 0.0 if self._first_ns is None else (event.log_time_ns - self._first_ns) / NS_PER_S
+        since = f", {self._after(event.log_time_ns)}" if 0.0 < after_s < _LONGEST_RUN_S else ""
+        return f"{event.topic} at {moment(event.log_time_ns)}{since}"
 
     def sum_up(self, report: Report, paths: Sequence[str]) -> None:
         """Say what was skipped, how long it took, and what was written."""
@@ -149,7 +180,9 @@ class Narrator:
         )
 
     def say(self, text: str) -> None:
-        """Say a line."""
+        """Say a line, unless nothing is to be said."""
+        if self._talk is Talk.QUIET:
+            return
         self._console.print(plain(text), markup=False, soft_wrap=True)
 
     def finish(self) -> None:
@@ -171,64 +204,40 @@ def _ends_early(skipped: Report) -> bool:
     return bool(skipped["cause"] == SkipCause.ENDS_EARLY)
 
 
-def open_notes() -> Console:
+def told(event: Merged, after: str) -> Iterator[str]:
+    """Yield what was done at one time: which maps came, which pairs were searched and why, and what that took."""
+    result, spent_s = event.result, event.timing.merge_s + event.timing.render_s
+    came = f"new maps of {listed(result.updated)}" if result.updated else "nothing new"
+    yield f"{after}: {came}; {event.done} of {counted(event.total, 'message')} read; {spent_s:.2f} s"
+    for pair, trigger in result.searched.items():
+        match = result.pairs[pair]
+        sure = "" if match.confidence is None else f" (confidence {share(match.confidence, 4)})"
+        verdict = "accepted" if match.accepted else "refused"
+        yield f"  {pair[1]} on {pair[0]} searched, as {trigger.words}: {verdict}{sure}: {match.reason.message}"
+
+
+def open_notes(colour: str = "auto") -> Console:
     """Return a console on standard error, which falls silent where that cannot be written."""
-    return _console(quiet_stderr())
+    return open_console(quiet_stderr(), colour)
 
 
-def _console(stream: IO[str]) -> Console:
+def open_console(stream: IO[str], colour: str = "auto") -> Console:
     """Return a console; where there is no terminal, lines are not broken at its width."""
     from rich.console import Console
 
-    width = None if stream.isatty() else _WIDTH_WHERE_NO_TERMINAL
-    return Console(file=stream, width=width, highlight=False, soft_wrap=False)
+    on = are_on(stream, colour)
+    return Console(
+        file=stream,
+        width=None if stream.isatty() else _WIDTH_WHERE_NO_TERMINAL,
+        highlight=False,
+        soft_wrap=False,
+        # the library would take what forces colours for a terminal, and show its progress there
+        force_terminal=stream.isatty(),
+        no_color=not on,
+        color_system=("auto" if stream.isatty() else "standard") if on else None,
+    )
 
 
-def table_text(report: Report) -> str:
-    """Return a row for each robot: status, pose (its scale if that is free), agreement, confidence if known, reason.
-
-    It is made for standard output, and not printed: of an error there, the library would end the program.
-    """
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("robot", "status"):
-        table.add_column(name, no_wrap=True)
-    known = any(row["confidence"] is not None for row in report["robots"].values())
-    scaled = report["settings"]["merge"]["scale"] == "free"
-    pose = ("x / m", "y / m", "yaw / °", *(["scale"] if scaled else []))
-    for name in (*pose, "acceptance", "overlap", *(["confidence"] if known else [])):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("reason", overflow="fold")
-    for robot, row in report["robots"].items():
-        status = str(row["status"])
-        table.add_row(
-            Text(plain(robot)),
-            Text(status, style=_STYLES[status]),
-            *_pose(row["merged_from_map"])[: len(pose)],
-            _share(row["acceptance"], 3),
-            _figure(row["overlap_m2"], "{:.1f} m²"),
-            *([_share(row["confidence"], 4)] if known else []),
-            Text(plain(row["reason"]["message"])),
-        )
-    console = _console(sys.stdout)
-    with console.capture() as captured:
-        console.print(table)
-    return captured.get()
-
-
-def _pose(pose: dict[str, float] | None) -> tuple[str, ...]:
-    if pose is None:
-        return ("–",) * 4
-    turn_deg = math.degrees(pose["yaw_rad"])
-    return f"{pose['x_m']:.2f}", f"{pose['y_m']:.2f}", f"{turn_deg:.1f}", f"{pose['scale']:.3f}"
-
-
-def _share(value: float | None, digits: int) -> str:
+def share(value: float | None, digits: int) -> str:
     """Return a share rounded down, so that what is less than a limit, or than 1, reads like that."""
-    return "–" if value is None else f"{math.floor(value * 10**digits) / 10**digits:.{digits}f}"
-
-
-def _figure(value: Any, form: str) -> str:  # noqa: ANN401 - a JSON number or null
-    return "–" if value is None else form.format(value)
+    return "–" if value is None else f"{rounded_down(value, digits):.{digits}f}"

@@ -116,7 +116,7 @@ def test_interrupted_when_all_is_written_says_so(replay: Program, two: Path, mon
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("replay.sinks.terminal.table_text", interrupted)
+    monkeypatch.setattr("replay.sinks.terminal_table.table_text", interrupted)
     ran = replay.merge(two)
     assert ran.status == 130
     assert ran.err.splitlines()[-1] == "replay: interrupted; the outputs are written"
