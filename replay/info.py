@@ -81,6 +81,14 @@ class RunSummary:
     unused: tuple[str, ...]
     problem: str | None
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing is lost, each message with a map can be used, and something would be merged."""
+        unusable = any(topic.unusable for item in self.inputs for topic in item.topics)
+        is_lost = any(item.losses for item in self.inputs)
+        would_be = [item for item in self.robots if item not in self.mapless]
+        return not (self.problem or is_lost or unusable or self.mapless) and len(would_be) > 1
+
 
 def summarise(options: RunOptions) -> RunSummary:
     """Read what the recordings hold.

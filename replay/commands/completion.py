@@ -47,5 +47,5 @@ def run(options: argparse.Namespace) -> int:
             if action.type is Path or action.dest in _FILES:
                 action.complete = shtab.FILE  # type: ignore[attr-defined]  # as the library asks for
     with printing():
-        sys.stdout.write(shtab.complete(program, shell=options.shell) + "\n")
+        sys.stdout.write(shtab.complete(program, options.shell) + "\n")
     return EXIT_DONE
