@@ -167,6 +167,7 @@ class MergeRun(Iterator[Event]):
         self,
         output: PathLike,
         *,
+        report: PathLike | None = None,
         rrd: bool = True,
         every_s: float = 0.0,
         copy_maps: bool = False,
@@ -177,7 +178,9 @@ class MergeRun(Iterator[Event]):
         Parameters
         ----------
         output
-            The new MCAP; the Rerun recording and the report stand beside it.
+            The new MCAP; the Rerun recording and the report as JSON stand beside it.
+        report
+            The report as a page to look at in a browser, a name that ends in ``.html``.
         rrd
             Whether the Rerun recording is written.
         every_s
@@ -198,14 +201,19 @@ class MergeRun(Iterator[Event]):
         """
         if self._events is not None:
             raise UsageError("events of this run were taken already; call replay.merge anew and write that")
-        from replay.flags.values import mcap_path
+        from replay.flags.values import html_path, mcap_path
         from replay.outputs import refuse_outputs
         from replay.pipeline import drain, events
         from replay.plan import open_plan
         from replay.sinks import open_sinks
 
         written = OutputOptions(
-            mcap_path(Path(output)), rrd=rrd, every_ns=_nanoseconds(every_s), copy_maps=copy_maps, force=force
+            mcap_path(Path(output)),
+            rrd=rrd,
+            html=None if report is None else html_path(Path(report)),
+            every_ns=_nanoseconds(every_s),
+            copy_maps=copy_maps,
+            force=force,
         )
         options = replace(self.options, images=self._written_images)
         self._events = _nothing()

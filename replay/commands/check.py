@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from replay.errors import OutputError, ReplayError, UsageError
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE, interrupted_late
-from replay.flags import inputs, outputs, placing, rules
+from replay.flags import inputs, outputs, placing, rules, talk
 from replay.standard_streams import printing, say, takes
 
 if TYPE_CHECKING:
@@ -52,6 +52,15 @@ exit status: 0 all is as expected, or the expectation is written; 1 something is
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add recordings, all flags of a run, and those of what is expected."""
     inputs.add(parser)
+    add_expected(parser)
+    placing.add(parser)
+    outputs.add(parser)
+    rules.add(parser)
+    talk.add(parser)
+
+
+def add_expected(parser: argparse.ArgumentParser) -> None:
+    """Add the flags of what is expected."""
     group = parser.add_argument_group("what is expected")
     group.add_argument("--expect", metavar="EXPECT.yaml", type=Path, help="hold the outcome against this")
     group.add_argument(
@@ -59,13 +68,11 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--junit", metavar="OUT.xml", type=Path, help="write the findings as JUnit XML; replaces it")
     group.add_argument("--summary", metavar="FILE", help="append the findings to this file as Markdown")
-    placing.add(parser)
-    outputs.add(parser)
-    rules.add(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Merge, and say what is not as expected."""
+    inputs.refuse_no_runs(options)
     if (options.expect is None) == (options.write_expect is None):
         raise UsageError("give either --expect EXPECT.yaml or --write-expect EXPECT.yaml")
     if options.write_expect is not None and (options.junit or options.summary):
@@ -92,7 +99,7 @@ def _check(options: argparse.Namespace) -> int:
         if options.junit is not None and not isinstance(error, OutputError):
             _write_error(str(error), options)
         raise
-    _tell(found, report, as_json=options.json)
+    _tell(found, report, options)
     return EXIT_DONE if all(item.holds for item in found) else EXIT_DIFFERS
 
 
@@ -134,7 +141,7 @@ def _merged(options: argparse.Namespace) -> Report:
         options.images = "none"
     run_options = inputs.run_options(options)
     written = outputs.output_options(options, run_options) if options.output is not None else None
-    merging = Run(run_options, written)
+    merging = Run(run_options, written, talk.of(options), options.color)
     options.is_published = lambda: written is not None and merging.narrator.is_published
     report = merging.merge()
     paths = output_paths(written).values() if written is not None else ()
@@ -182,13 +189,13 @@ def _write_error(message: str, options: argparse.Namespace) -> None:
     write_files({options.junit: junit_error_xml(message, title)}, force=True)
 
 
-def _tell(found: Sequence[Finding], report: Report, *, as_json: bool) -> None:
+def _tell(found: Sequence[Finding], report: Report, options: argparse.Namespace) -> None:
     from replay.checks.words import FAILS, HOLDS, failing, lines
     from replay.sinks.json_file import report_text
 
     with printing():
-        if as_json:
-            text = report_text(report)
+        if options.json or options.quiet:
+            text = report_text(report) if options.json else ""
             sys.stdout.write(text if takes(text) else report_text(report, is_ascii=True))
             for line in failing(found):
                 say(f"replay: {line}")

@@ -26,12 +26,15 @@ exit status: 0 printed; 2 bad usage, or a setting that there is not; 3 standard 
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add all that are settings of `replay merge`."""
+    """Add all that are settings of some command."""
+    from replay.commands.check import add_expected
+
     inputs.add(parser, "--from")
     parser.add_argument("--changed", action="store_true", help="print only those that are not the default")
     placing.add(parser)
     outputs.add(parser)
     rules.add_all(parser)
+    add_expected(parser)
 
 
 def run(options: argparse.Namespace) -> int:

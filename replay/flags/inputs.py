@@ -89,9 +89,8 @@ def run_options(options: argparse.Namespace, *, needs_runs: bool = True) -> RunO
     UsageError
         If something of that cannot be understood, or no recording is given.
     """
-    if needs_runs and not options.runs:
-        example = f"replay {options.command} run.mcap"
-        raise UsageError(f"RUN is missing; expected one recording or more, PATH or ROBOT=PATH, such as `{example}`")
+    if needs_runs:
+        refuse_no_runs(options)
     from replay.footprint import size_to_bytes
     from replay.options import RunOptions, TimeBound, seconds_to_ns
     from replay.runs import RunPath, TopicChoice
@@ -114,6 +113,13 @@ def run_options(options: argparse.Namespace, *, needs_runs: bool = True) -> RunO
         jobs=rules.jobs(options.jobs) if hasattr(options, "jobs") else 1,
         **placed,
     )
+
+
+def refuse_no_runs(options: argparse.Namespace) -> None:
+    """Refuse a command line that names no recording, if no file of settings does."""
+    if not options.runs:
+        example = f"replay {options.command} run.mcap"
+        raise UsageError(f"RUN is missing; expected one recording or more, PATH or ROBOT=PATH, such as `{example}`")
 
 
 def _robots(text: str | None) -> tuple[str, ...] | None:

@@ -17,10 +17,16 @@ SECTIONS: Mapping[str, str] = {
     "how maps are placed": "placing.",
     "outputs": "outputs.",
     "rules": "rules.",
+    "what is expected": "check.",
 }
 """Groups of flags that are settings → the section that they are in; "" for the top of the file."""
 
-OF_ONE_CALL = frozenset({"help", "config", "set", "force", "json", "view", "changed", "quiet", "verbose", "color"})
+OF_ONE_CALL = frozenset(
+    {
+        *("help", "config", "set", "changed", "force", "write_expect"),
+        *("json", "view", "quiet", "verbose", "color", "summary"),
+    }
+)
 """Flags within these groups, and others, that say what to do this time, and are nobody's setting.
 
 What replaces files must be asked for each time, and what is shown is for whoever looks.

@@ -48,9 +48,10 @@ def test_what_is_written_is_what_the_command_line_writes(tmp_path: Path, capsys:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "a.mcap", "b.json", "b.mcap"]
 
 
-def test_the_recording_for_rerun_is_written_too(tmp_path: Path) -> None:
-    replay.merge(SAMPLE, stop=20, images="none").write(tmp_path / "b.mcap")
+def test_the_recording_for_rerun_and_the_page_are_written_too(tmp_path: Path) -> None:
+    replay.merge(SAMPLE, stop=20, images="none").write(tmp_path / "b.mcap", report=tmp_path / "page.html")
     assert (tmp_path / "b.rrd").stat().st_size > 1000
+    assert "<html" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 def test_a_run_is_over_once() -> None:

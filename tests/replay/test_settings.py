@@ -49,10 +49,14 @@ def test_each_flag_is_a_setting_or_of_one_call(command: str) -> None:
         assert (action.dest in settings) is not (action.dest in keys.OF_ONE_CALL), (title, action.dest)
 
 
-def test_each_flag_of_merge_is_in_the_list() -> None:
-    flags = {action.dest for action in keys.settings_of(command_parser("merge")).values()}
-    config = {action.dest for action in keys.settings_of(command_parser("config")).values()}
-    assert flags == config
+def test_each_setting_of_a_command_is_in_the_list() -> None:
+    assert set(keys.settings_of(command_parser("config"))) == set(keys.all_settings())
+
+
+@pytest.mark.parametrize("command", TAKING)
+def test_a_flag_is_the_same_setting_of_each_command(command: str) -> None:
+    names = {action.dest: key for key, action in keys.all_settings().items()}
+    assert all(names[action.dest] == key for key, action in keys.settings_of(command_parser(command)).items())
 
 
 def test_each_field_of_the_merger_is_a_setting() -> None:
