@@ -21,6 +21,7 @@ examples:
   replay merge run.mcap --robots r1,r2
   replay merge alpha=alpha_bag/ bravo=bravo_bag/ -o out/floor.mcap
   replay merge today.mcap old=map.yaml --robots r1,old --require-all
+  replay config run.mcap --robots r1,r2 --changed > mission.toml && replay merge --config mission.toml
   replay recover out/floor.mcap.partial
 
 `replay COMMAND --help` lists the arguments of a command.
@@ -78,15 +79,18 @@ class Parser(argparse.ArgumentParser):
         """
         if not self.takes_settings:
             return self.parse_args(arguments)
-        unsaid = {action.dest: _unsaid(action) for action in self._actions if action.dest != "help"}
-        said = vars(self.parse_args(arguments, argparse.Namespace(**unsaid)))
+        flags = [action for action in self._actions if action.option_strings and action.dest != "help"]
+        unsaid = {action.dest: _unsaid(action) for action in flags}
+        # recordings may stand before, after and between flags; where some begin with a dash, after a double one
+        parse = self.parse_args if "--" in arguments else self.parse_intermixed_args
+        said = vars(parse(arguments, argparse.Namespace(**unsaid)))
         given = {name: value for name, value in said.items() if value is not _UNSAID and value not in ([], None)}
         chosen: dict[str, object] = {}
         if "config" in given or "set" in given:
             from replay.settings.choice import chosen_by
 
             chosen = chosen_by(self, given)
-        defaults = {name: self.get_default(name) for name in unsaid}
+        defaults = {name: self.get_default(name) for name in said}
         return argparse.Namespace(**{**defaults, **chosen, **given})
 
     def _meant(self, message: str) -> str:

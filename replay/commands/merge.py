@@ -25,6 +25,7 @@ examples:
   replay merge run.mcap --topic '/{robot}/slam/map'
   replay merge run.mcap --start 60 --stop 300 --no-rrd --json
   replay merge run.mcap --init-pose r2=4.5,-1.2,90deg+-0.5,+-0.5,+-5deg
+  replay merge --config mission.toml --start 120         all settings from a file, see `replay config`; flags win
 
 exit status: 0 done; 1 a robot was not merged and --require-all was given; 2 bad usage or input;
 3 an output could not be written, or a bug; 130 interrupted

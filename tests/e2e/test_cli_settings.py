@@ -185,3 +185,11 @@ def test_the_example_of_the_documents_is_a_file_of_settings(replay: Program, tmp
     found = tomllib.loads(replay("config", "--config", written(tmp_path, example)).out)
     assert found["merge"]["verify"]["min_overlap_m2"] == 10.0
     assert found["outputs"]["output"] == str(tmp_path / "out/floor.mcap")
+
+
+def test_recordings_may_stand_between_flags(replay: Program) -> None:
+    said = replay("config", "--robots", "r1,r2", "a.mcap", "--start", "5", "b.mcap", "--topic", "r1=/x").out
+    found = tomllib.loads(said)
+    assert (found["runs"], found["robots"], found["topics"]) == (["a.mcap", "b.mcap"], ["r1", "r2"], ["r1=/x"])
+    dashed = tomllib.loads(replay("config", "--start", "5", "--", "-a.mcap", "b.mcap").out)
+    assert (dashed["runs"], dashed["time"]["start"]) == (["-a.mcap", "b.mcap"], 5)

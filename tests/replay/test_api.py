@@ -158,25 +158,12 @@ def test_without_a_recording_there_is_no_run() -> None:
             replay.merge(runs)
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [(None, "there is no such file"), (b"{", "is no JSON"), (b"\xff", "is no JSON"), (b"[]", "is no report of a run")],
-)
-def test_reports_that_are_none(tmp_path: Path, content: bytes | None, said: str) -> None:
+@pytest.mark.parametrize("content", [None, b"{", b"\xff", b"[]", b""])
+def test_reports_that_are_none(tmp_path: Path, content: bytes | None) -> None:
     path = tmp_path / "x.json"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(replay.InputError, match=said):
-        replay.read_report(path)
-
-
-@pytest.mark.parametrize(
-    ("content", "said"), [(b"", "cannot be read as an MCAP"), (b"x" * 999, "cannot be read as an MCAP")]
-)
-def test_files_that_are_no_mcap_hold_no_report(tmp_path: Path, content: bytes, said: str) -> None:
-    path = tmp_path / "x.mcap"
-    path.write_bytes(content)
-    with pytest.raises(replay.InputError, match=said):
+    with pytest.raises(replay.InputError, match="x.json: "):
         replay.read_report(path)
 
 
