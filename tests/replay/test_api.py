@@ -163,7 +163,7 @@ def test_reports_that_are_none(tmp_path: Path, content: bytes | None) -> None:
     path = tmp_path / "x.json"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(replay.InputError, match="x.json: "):
+    with pytest.raises(replay.InputError, match=r"x\.json: "):
         replay.read_report(path)
 
 
