@@ -45,7 +45,7 @@ def _table(report: Report, reasons: Sequence[str]) -> Table:
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(box=None, pad_edge=False, header_style="bold")
+    table = Table(box=None, pad_edge=False, header_style="bold", collapse_padding=not reasons)
     # where figures have little room, they go before the end of a name, which stands with its reason as well
     table.add_column("robot", no_wrap=True, max_width=None if reasons else _LONGEST_NAME)
     table.add_column("status", no_wrap=True)
