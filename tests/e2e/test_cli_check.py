@@ -134,7 +134,8 @@ def test_a_run_that_was_made_before_is_not_made_again(replay: Program, outcome: 
     for run in (outcome, outcome.with_suffix(".json")):
         ran = checked(replay, run, "robots: {r2: merged}")
         assert (ran.status, ran.err) == (0, "")
-    assert "nothing is merged" in checked(replay, outcome, "robots: {r2: merged}", "-o", "new.mcap").error
+    for flags in (("-o", "new.mcap"), ("--robots", "r1,r2"), ("--init-pose", "r2=0,0,0")):
+        assert "nothing is merged" in checked(replay, outcome, "robots: {r2: merged}", *flags).error
 
 
 def test_outputs_are_written_where_they_are_asked_for(replay: Program, two: Path) -> None:
