@@ -42,7 +42,9 @@ class Node:
     def place(self) -> str:
         """Where it is, in words."""
         named = ".".join(map(str, self.keys)) or "it"
-        return f"line {self.lines[self.keys]}: {named}" if self.keys in self.lines else named
+        around = (self.keys[:count] for count in range(len(self.keys), 0, -1))
+        line = next((self.lines[keys] for keys in around if keys in self.lines), None)
+        return named if line is None else f"line {line}: {named}"
 
     def refuse(self, expected: str) -> NoReturn:
         """Say what is expected instead of the value.

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from mapmerge.merger import MergeResult
     from mapmerge.render import Picture
 
+SCHEMA = "replay.report/1"
+"""The form of reports, of which a program that reads them takes note."""
+
 Report = Mapping[str, Any]
 """A report as JSON values, as ``docs/report.schema.json`` describes it."""
 

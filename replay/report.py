@@ -18,10 +18,9 @@ from mapmerge.outcome import ChangeKind, Pair, RobotOutcome
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2, wrap_angle
-from replay.events import Noted, Report, RobotInput, Skipped
+from replay.events import SCHEMA, Noted, Report, RobotInput, Skipped
 from replay.sources.losses import Listing
 
-SCHEMA = "replay.report/1"
 _DIGITS = 6
 _MAX_YAW_RAD = 3.141592  # rounded up, π would lie outside (−π, π]
 

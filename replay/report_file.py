@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from replay.errors import InputError
-from replay.events import Report
+from replay.events import SCHEMA, Report
 from replay.options import TimeBound
-from replay.report import SCHEMA
 from replay.sources.base import Encoding
 from replay.sources.boundary import translated
 from replay.sources.mcap.file import McapFile

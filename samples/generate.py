@@ -1,4 +1,7 @@
-"""Makes the recordings of this folder: ``python samples/generate.py [--out DIR] [--seed N] [--only NAME]``."""
+"""Makes the recordings of this folder.
+
+``python samples/generate.py [--out DIR] [--seed N] [--only NAME] [--true-maps]``
+"""
 
 from __future__ import annotations
 
@@ -16,10 +19,12 @@ import numpy as np
 if not __package__:  # run as a script: only this folder is on the path
     sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from replay.export import map_server
 from samples.drive import Stop, follow, route, stops, survey, tour, window
 from samples.floorplan import FloorStyle, office_floor
 from samples.mission import Robot, Run, explore, truth, truth_record
 from samples.record import Event, Names, Timing, WriteRecording, events, write_bag1, write_bag2, write_mcap
+from samples.true_map import true_map
 
 EPOCH_NS = 1_750_000_000_000_000_000
 RESTART_PAUSE_S = 8.0
@@ -211,15 +216,25 @@ def generate(name: str, out: Path, seed: int) -> None:
         write_apart(out / name, recipe, seed, write_bag2)
 
 
+def write_true_map(name: str, out: Path, seed: int) -> None:
+    """Write the floor of a recording as a saved map, in the reference's map frame."""
+    recipe = RECIPES[name]
+    world = office_floor(recipe.floor_seed + 1000 * seed, recipe.style)
+    grid = true_map(world, simulate(recipe, seed)[0][-1].run.world_from_map)
+    for path, content in map_server.files(grid, out / f"{name}.true_map", "trinary").items():
+        path.write_bytes(content)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command."""
     parser = argparse.ArgumentParser(description="Make the sample recordings.")
     parser.add_argument("--out", type=Path, default=Path(__file__).resolve().parent, help="folder to write into")
     parser.add_argument("--seed", type=int, default=0, help="0 gives the recordings of the repository")
+    parser.add_argument("--true-maps", action="store_true", help="write the floors as saved maps, and no recordings")
     parser.add_argument("--only", choices=sorted(RECIPES), help="make just this one")
     options = parser.parse_args(arguments)
     for name in [options.only] if options.only else RECIPES:
-        generate(name, options.out, options.seed)
+        (write_true_map if options.true_maps else generate)(name, options.out, options.seed)
         print(f"{name}: written to {options.out}")
 
 

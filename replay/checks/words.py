@@ -30,7 +30,7 @@ def count(found: Sequence[Finding]) -> str:
     """Return how many expectations hold."""
     failed = sum(not item.holds for item in found)
     if not failed:
-        return f"all {counted(len(found), 'expectation')} hold"
+        return "1 expectation holds" if len(found) == 1 else f"all {len(found)} expectations hold"
     return f"{failed} of {counted(len(found), 'expectation')} {'does' if failed == 1 else 'do'} not hold"
 
 

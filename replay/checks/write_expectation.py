@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator
 
 from replay.checks.expectation import WITHIN_DEG, WITHIN_M
-from replay.plain_text import plain_json
 from replay.run_result import RobotResult, RunResult
 
 _SHARE_LESS = 0.02
@@ -63,5 +61,11 @@ def _limits(robot: RobotResult) -> Iterator[str]:
 
 
 def _name(name: str) -> str:
-    """Return a name in double quotes, in which JSON and YAML are alike."""
-    return plain_json(json.dumps(name, ensure_ascii=False))
+    """Return a name in double quotes, with all that is not seen in it escaped as YAML has it."""
+    return f'"{"".join(map(_character, name))}"'
+
+
+def _character(character: str) -> str:
+    if character in '"\\':
+        return f"\\{character}"
+    return character if character.isprintable() else f"\\U{ord(character):08x}"

@@ -48,6 +48,12 @@ exit status: 0 all is as expected, or the expectation is written; 1 something is
 3 an output could not be written, or a bug; 130 interrupted
 """
 
+_OF_A_MERGE = (
+    *("--config", "--set"),
+    *("--output", "--report", "--robots", "--topic", "--start", "--stop"),
+    *("--align-starts", "--init-pose", "--use-tf", "--strict"),
+)
+
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add recordings, all flags of a run, and those of what is expected."""
@@ -120,13 +126,11 @@ def _result(options: argparse.Namespace) -> tuple[RunResult, Report]:
     from replay.report_file import holds_report, read_report
     from replay.run_result import RunResult
 
-    (first, *others) = options.runs
-    path = Path(first)
-    if not others and holds_report(path):
-        if options.output is not None:
-            raise UsageError(
-                f"--output {options.output}: nothing is merged, because {path} is a run that was made before"
-            )
+    path = Path(options.runs[0]) if options.runs else Path()  # without one, the error is that of any command
+    if len(options.runs) == 1 and holds_report(path):
+        useless = [flag for flag in _OF_A_MERGE if getattr(options, flag.removeprefix("--").replace("-", "_"))]
+        if useless:
+            raise UsageError(f"{', '.join(useless)}: {path} is a run that was made before: nothing is merged")
         report = read_report(path)
         return RunResult.of(report, path), report
     report = _merged(options)
@@ -137,10 +141,11 @@ def _merged(options: argparse.Namespace) -> Report:
     from replay.run_merge import Run
     from replay.sinks import output_paths
 
-    if options.output is None:
+    is_written = options.output is not None or options.report is not None
+    if not is_written:
         options.images = "none"
     run_options = inputs.run_options(options)
-    written = outputs.output_options(options, run_options) if options.output is not None else None
+    written = outputs.output_options(options, run_options) if is_written else None
     merging = Run(run_options, written, talk.of(options), options.color)
     options.is_published = lambda: written is not None and merging.narrator.is_published
     report = merging.merge()

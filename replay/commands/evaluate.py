@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from replay.errors import UsageError
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE
 from replay.flags.numbers import at_least_0
-from replay.standard_streams import printing
+from replay.standard_streams import printing, say
 
 if TYPE_CHECKING:
     from replay.evaluation.truth import Truth
@@ -100,13 +100,14 @@ def _map_evaluation(options: argparse.Namespace, truth: Truth) -> MapEvaluation:
     from mapmerge.likeness import likeness
     from mapmerge.sim2 import IDENTITY
     from replay.evaluation.words import MapEvaluation
-    from replay.export.maps import THE_MAP, one_map
+    from replay.export.maps import THE_MAP, one_map, told
     from replay.report_file import holds_mcap
 
     if not holds_mcap(options.file):
         raise UsageError(f"--true-map: {options.file} holds no merged map; give OUT.mcap")
     merged, true = (
-        one_map(path, None, None, lambda _: None).grids[THE_MAP] for path in (options.file, options.true_map)
+        one_map(path, None, None, lambda event: say(f"replay: {told(event)}")).grids[THE_MAP]
+        for path in (options.file, options.true_map)
     )
     merged_from_true = truth.reference_from_true_map or IDENTITY
     found = likeness(merged, true, merged_from_true, tolerance_m, CellConfig())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -136,8 +137,9 @@ def _maps(options: argparse.Namespace, at: TimeBound | None) -> int:
     found = _chosen(options, at)
     write = writer(options.to)
     contents: dict[Path, bytes] = {}
+    stems = _stems(options, list(found.grids))
     for name, grid in found.grids.items():
-        contents |= write(grid, _stem(options, name, is_one=len(found.grids) == 1), options.mode)
+        contents |= write(grid, stems[name], options.mode)
     refuse_files(list(contents), [options.file, *found.files], force=options.force)
     write_files(contents, force=options.force)
     _tell(found, [str(path) for path in contents], options)
@@ -176,21 +178,26 @@ def _robots(text: str, result: RunResult) -> tuple[str, ...]:
     return names
 
 
-def _stem(options: argparse.Namespace, robot: str, *, is_one: bool) -> Path:
-    """Return the path of a map's files, without their endings."""
+def _stems(options: argparse.Namespace, robots: Sequence[str]) -> dict[str, Path]:
+    """Return the paths of the files of each map, without their endings, no two alike."""
     path: Path = options.output or Path(options.file.resolve().name)
     known = TARGETS[options.to].suffixes if options.output is not None else (options.file.suffix,)
     name = path.name.removesuffix(path.suffix) if path.suffix and path.suffix in known else path.name
-    return path.with_name(name if is_one else f"{name}.{robot.replace('/', '_')}")
+    if len(robots) == 1:
+        return {robots[0]: path.with_name(name)}
+    parts: dict[str, str] = {}
+    for robot in robots:
+        part = re.sub(r"[^\w.-]", "_", robot)
+        while part in parts.values():
+            part += "_"
+        parts[robot] = part
+    return {robot: path.with_name(f"{name}.{part}") for robot, part in parts.items()}
 
 
 def _say(event: Skipped | Noted) -> None:
-    from replay.events import Noted
+    from replay.export.maps import told
 
-    if isinstance(event, Noted):
-        say(f"replay: {plain(event.message)}")
-    else:
-        say(f"replay: skipped ({plain(event.input)}, {plain(event.where)}): {event.cause}: {plain(event.detail)}")
+    say(f"replay: {told(event)}")
 
 
 def _tell(found: Maps, paths: Sequence[str], options: argparse.Namespace) -> None:

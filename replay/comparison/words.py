@@ -20,7 +20,7 @@ def lines(comparison: Comparison, before: Path, after: Path) -> Iterator[str]:
         yield f"no difference between {before} and {after}"
         return
     yield f"{counted(len(comparison.differences), 'difference')} between {before} and {after}"
-    rows = [("robot", "what", "before", "after", "")]
+    rows = [("robot", "what", "before", "after", "difference")]
     rows += [
         (item.robot or "(run)", item.what, item.before, item.after, item.detail) for item in comparison.differences
     ]

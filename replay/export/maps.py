@@ -11,7 +11,7 @@ from replay.arrivals import Tally
 from replay.errors import InputError, UsageError
 from replay.events import Noted, Skipped
 from replay.options import RunOptions, TimeBound
-from replay.plain_text import listed
+from replay.plain_text import listed, plain
 from replay.plan import open_plan
 from replay.runs import RunPath, TopicChoice
 from replay.sources import open_source
@@ -24,6 +24,13 @@ Say = Callable[[Skipped | Noted], None]
 
 THE_MAP = "map"
 """What stands for the robot where a map is no robot's."""
+
+
+def told(event: Skipped | Noted) -> str:
+    """Return what is not used, or is to be known, as a line."""
+    if isinstance(event, Noted):
+        return plain(event.message)
+    return plain(f"skipped ({event.input}, {event.where}): {event.cause}: {event.detail}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from mapmerge.grid import UNKNOWN_BYTE, Grid
 from mapmerge.plane import Box, read
 from mapmerge.sim2 import Sim2
 from mapmerge.warp import Layer
+from replay.documents import Node
 from replay.errors import InputError, UsageError
 from replay.export.maps import THE_MAP, Maps, Say, grid_topics, maps_at, one_map
 from replay.options import ClockChoice, RunOptions, TimeBound
@@ -103,10 +104,9 @@ def _pose(result: RunResult, robot: str) -> Sim2:
 def _own_maps(
     result: RunResult, robots: Sequence[str], recordings: Sequence[RunPath], at: TimeBound | None, say: Say
 ) -> Maps:
-    topics = {name: robot.map_topic for name, robot in result.robots.items()}
     if recordings:
-        return maps_at(_as_merged(result, recordings, topics), at or _end(result), say)
-    copies = {name: f"/{part}/map" for name, part in topic_parts(list(topics)).items()}
+        return maps_at(_as_merged(result, recordings), at or _end(result), say)
+    copies = {name: f"/{part}/map" for name, part in topic_parts(list(result.robots)).items()}
     there = grid_topics(result.name) if holds_mcap(result.name) else []
     missing = [name for name in robots if copies[name] not in there]
     if missing:
@@ -119,16 +119,35 @@ def _own_maps(
     return maps_at(RunOptions((RunPath(None, result.name),), tuple(found), choices), at, say)
 
 
-def _as_merged(result: RunResult, recordings: Sequence[RunPath], topics: Mapping[str, str]) -> RunOptions:
-    """Return how the recordings were read, so that times are those of the run."""
+def _as_merged(result: RunResult, recordings: Sequence[RunPath]) -> RunOptions:
+    """Return how the recordings were read, so that maps and times are those of the run.
+
+    Raises
+    ------
+    UsageError
+        If they are not those that were merged.
+    """
+    names = [run.path.resolve().name for run in recordings]
+    missing = [name for name in result.digests if name not in names]
+    if missing:
+        raise UsageError(f"--maps {' '.join(names)}: {listed(missing)} was merged as well; give it with --maps, too")
     clock: ClockChoice = "log" if result.settings.get("clock") == "log" else "header"
     return RunOptions(
         tuple(recordings),
         tuple(result.robots),
-        tuple(TopicChoice(name, topic) for name, topic in topics.items()),
+        _topics(result),
         clock=clock,
         align_starts=bool(result.settings.get("align_starts")),
     )
+
+
+def _topics(result: RunResult) -> tuple[TopicChoice, ...]:
+    """Return the topics that the run was told."""
+    node = Node(result.name, result.settings, ("settings",)).get("topics")
+    if node is None or not isinstance(node.value, list):
+        return ()
+    items = [replace(node, value=value, keys=(*node.keys, at)) for at, value in enumerate(node.value)]
+    return tuple(TopicChoice(item.maybe("robot", Node.text), item.need("topic").text()) for item in items)
 
 
 def _end(result: RunResult) -> TimeBound | None:

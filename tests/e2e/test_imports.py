@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 
 import pytest
 
+from replay.commands import COMMANDS
 from tests.data_paths import ROOT
 
 HEAVY = {"numpy", "cv2", "rosbags", "mcap", "rerun", "rich", "ruamel", "lz4", "zstandard"}
@@ -22,7 +24,7 @@ def loaded(code: str) -> set[str]:
     return set(done.stderr.split())
 
 
-@pytest.mark.parametrize("arguments", [("--help",), ("merge", "--help"), ("info", "--help"), ("--version",), ("fly",)])
+@pytest.mark.parametrize("arguments", [("--help",), *((name, "--help") for name in COMMANDS), ("--version",), ("fly",)])
 def test_help_imports_nothing_heavy(arguments: tuple[str, ...]) -> None:
     code = (
         "import contextlib, io\nfrom replay.cli import main\n"
@@ -40,6 +42,14 @@ def test_info_imports_nothing_that_merges() -> None:
     found = loaded(f"{QUIET}main(['info', {str(RUN)!r}])")
     assert {"numpy", "rosbags"} <= found
     assert not found & {"cv2", "rerun", "rich", "ruamel", "lz4"}
+
+
+def test_comparing_reports_imports_nothing_that_reads_maps(tmp_path_factory: pytest.TempPathFactory) -> None:
+    report = tmp_path_factory.mktemp("out") / "report.json"
+    keys = {"version": "1", "reference": "r1", "robots": {}, "skipped": {}, "settings": {}, "inputs": []}
+    report.write_text(json.dumps({"schema": "replay.report/1", **keys}), encoding="utf-8")
+    found = loaded(f"{QUIET}main(['compare', {str(report)!r}, {str(report)!r}])")
+    assert not found & {"cv2", "rosbags", "rerun", "rich", "ruamel"}
 
 
 def test_recovering_imports_nothing_that_knows_maps(tmp_path_factory: pytest.TempPathFactory) -> None:

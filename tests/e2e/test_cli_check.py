@@ -1,0 +1,314 @@
+"""`replay check`: whether a run comes out as expected, said to people and to CI."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from junitparser import JUnitXml
+
+from tests.bags import write_mcap
+from tests.program import Program, Ran, in_process_of_its_own
+from tests.runs import bare_room, in_log_order, reference_from, seen, two_robots
+
+TRUE = reference_from("r2")
+POSE = f"{{x_m: {TRUE.x_m}, y_m: {TRUE.y_m}, yaw_rad: {TRUE.yaw_rad}, within_m: 0.2, within_deg: 1}}"
+
+
+@pytest.fixture
+def mixed(tmp_path: Path) -> Path:
+    """A recording of two robots whose maps belong together, and one that saw too little."""
+    return write_mcap(tmp_path / "mixed.mcap", in_log_order(two_robots(), [seen("r3", 30.0, bare_room())]))
+
+
+def checked(replay: Program, run: Path, text: str, *flags: object) -> Ran:
+    path = replay.folder / "expect.yaml"
+    path.write_text(text, encoding="utf-8")
+    return replay("check", run, "--expect", path, *flags)
+
+
+def test_all_is_as_expected(replay: Program, mixed: Path) -> None:
+    text = f"""
+reference: r1
+other_robots: forbidden
+max_skipped: 0
+defaults: {{min_acceptance: 0.5}}
+robots:
+  r1: reference
+  r2:
+    status: merged
+    pose: {POSE}
+    min_confidence: 0.9
+    min_overlap_m2: 5
+    merged_within_s: 30
+  r3: {{status: unmerged, reason: [too_little_structure, no_candidate, too_little_overlap]}}
+"""
+    ran = checked(replay, mixed, text)
+    assert ran.status == 0, ran.out
+    lines = ran.out.splitlines()
+    assert lines[-1] == "all 12 expectations hold"
+    assert all(line.startswith("✓ ") for line in lines[:-1])
+    assert [path.name for path in replay.folder.iterdir()] == ["mixed.mcap", "expect.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("robots", "said"),
+    [
+        ("r2: unmerged", "r2: its status is unmerged; it is merged"),
+        ("r9: merged", "there is no such robot; there are r1, r2, r3"),
+        ("r3: merged", "r3: its status is merged; it is unmerged"),
+        ("r3: {status: unmerged, reason: ambiguous}", "r3: the reason is ambiguous; the reason is "),
+        ("r2: {status: merged, pose: {x_m: 0, y_m: 0, yaw_deg: 0}}", "it lies "),
+        ("r2: {status: merged, min_acceptance: 1}", "its acceptance is at least 1.000; it is 0.9"),
+        ("r2: {status: merged, min_confidence: 1}", "its confidence is at least 1.0000; it is 0.9"),
+        ("r2: {status: merged, min_overlap_m2: 1000}", "its overlap is at least 1000.0 m²; it is "),
+        ("r2: {status: merged, merged_within_s: 1}", "it is merged within 1 s of the first map; it was merged after "),
+    ],
+)
+def test_what_is_not_as_expected_ends_with_1(replay: Program, mixed: Path, robots: str, said: str) -> None:
+    ran = checked(replay, mixed, f"robots:\n  {robots}\n")
+    assert ran.status == 1
+    (line,) = [line for line in ran.out.splitlines() if line.startswith("✗ ")]
+    assert said in line
+    assert ran.out.splitlines()[-1].startswith("1 of ")
+
+
+def test_other_expectations_of_a_robot_that_is_not_merged_fail_with_it(replay: Program, mixed: Path) -> None:
+    ran = checked(
+        replay, mixed, f"robots: {{r3: {{status: merged, pose: {POSE}, min_acceptance: 0, merged_within_s: 99}}}}"
+    )
+    assert ran.status == 1
+    assert [line[0] for line in ran.out.splitlines()[:-1]] == ["✗"] * 4
+
+
+def test_expectations_of_the_run(replay: Program, mixed: Path) -> None:
+    text = "reference: r2\nother_robots: forbidden\nmax_skipped: {damaged: 0}\nrobots: {r1: reference}\n"
+    ran = checked(replay, mixed, text)
+    assert ran.status == 1
+    assert "✗ run: the reference is r2; it is r1" in ran.out
+    assert "✗ run: there is no other robot; others: r2, r3" in ran.out
+    assert "✓ run: at most 0 messages are skipped as damaged" in ran.out
+
+
+def test_skipped_messages_count(replay: Program, tmp_path: Path) -> None:
+    bad = write_mcap(tmp_path / "bad.mcap", in_log_order(two_robots(), [seen("r2", 40.0, resolution=0.0)]))
+    ran = checked(replay, bad, "max_skipped: 0\nrobots: {r2: merged}\n")
+    assert ran.status == 1
+    assert "✗ run: at most 0 messages are skipped; 1 skipped: 1 bad_resolution" in ran.out
+    assert checked(replay, bad, "max_skipped: 1\nrobots: {r2: merged}\n").status == 0
+
+
+def test_what_is_written_from_a_run_holds_of_it_and_not_of_another(replay: Program, two: Path, mixed: Path) -> None:
+    ran = replay("check", two, "--write-expect", "expect.yaml")
+    assert (ran.status, ran.out) == (0, "")
+    again = replay("check", two, "--expect", "expect.yaml")
+    assert again.status == 0, again.out
+    assert "it lies at" in again.out
+    assert "merged within" in again.out
+    assert replay("check", mixed, "--expect", "expect.yaml").status == 1
+    assert replay("check", mixed, "--robots", "r1,r2", "--expect", "expect.yaml").status == 0
+
+
+def test_an_expectation_is_not_replaced_unless_that_is_said(replay: Program, outcome: Path) -> None:
+    assert replay("check", outcome, "--write-expect", "expect.yaml").status == 0
+    assert "--force" in replay("check", outcome, "--write-expect", "expect.yaml").error
+    assert replay("check", outcome, "--write-expect", "expect.yaml", "--force").status == 0
+    assert "is an input" in replay("check", outcome, "--write-expect", outcome, "--force").error
+
+
+def test_names_of_robots_are_written_such_that_they_are_read(replay: Program, tmp_path: Path) -> None:
+    odd = write_mcap(
+        tmp_path / "odd.mcap",
+        in_log_order(
+            [seen("r1", 0.0, topic="/no/map"), seen("r2", 1.0, topic="/1e3/map"), seen("r2", 2.0, topic="/x/map")]
+        ),
+    )
+    assert replay("check", odd, "--write-expect", "expect.yaml").status == 0
+    assert replay("check", odd, "--expect", "expect.yaml").status == 0
+
+
+def test_a_run_that_was_made_before_is_not_made_again(replay: Program, outcome: Path) -> None:
+    for run in (outcome, outcome.with_suffix(".json")):
+        ran = checked(replay, run, "robots: {r2: merged}")
+        assert (ran.status, ran.err) == (0, "")
+    for flags in (("-o", "new.mcap"), ("--robots", "r1,r2"), ("--init-pose", "r2=0,0,0")):
+        assert "nothing is merged" in checked(replay, outcome, "robots: {r2: merged}", *flags).error
+
+
+def test_outputs_are_written_where_they_are_asked_for(replay: Program, two: Path) -> None:
+    ran = checked(replay, two, "robots: {r2: unmerged}", "-o", "new.mcap", "--no-rrd")
+    assert ran.status == 1
+    assert (replay.folder / "new.mcap").is_file()
+    assert replay("compare", "new.mcap", "new.json").status == 0
+
+
+def test_the_report_can_be_printed_instead(replay: Program, outcome: Path) -> None:
+    ran = checked(replay, outcome, "robots: {r2: unmerged}", "--json")
+    assert ran.status == 1
+    assert json.loads(ran.out) == json.loads(outcome.with_suffix(".json").read_text(encoding="utf-8"))
+    assert ran.err.startswith("replay: r2: its status is unmerged; it is merged")
+
+
+def test_a_terminal_that_has_few_characters_is_told_in_those(outcome: Path, tmp_path: Path) -> None:
+    (tmp_path / "expect.yaml").write_text("robots: {r1: reference, r2: unmerged}", encoding="utf-8")
+    code = "import sys, replay.cli; sys.stdout.reconfigure(encoding='ascii'); sys.exit(replay.cli.main(sys.argv[1:]))"
+    command = [sys.executable, "-c", code, "check", str(outcome), "--expect", "expect.yaml"]
+    ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert ran.returncode == 1
+    first, second, _ = ran.stdout.splitlines()
+    assert first.startswith("ok   r1: ")
+    assert second.startswith("FAIL r2: ")
+
+
+def test_junit_xml_is_read_by_others(replay: Program, mixed: Path) -> None:
+    ran = checked(replay, mixed, "robots:\n  r1: reference\n  r2: unmerged\n  r9: merged\n", "--junit", "out.xml")
+    assert ran.status == 1
+    (suite,) = JUnitXml.fromfile(str(replay.folder / "out.xml"))
+    assert (suite.name, suite.tests, suite.failures, suite.errors) == ("mixed.mcap", 3, 2, 0)
+    cases = list(suite)
+    assert [(case.classname, case.name, case.is_passed) for case in cases] == [
+        ("r1", "its status is reference", True),
+        ("r2", "its status is unmerged", False),
+        ("r9", "its status is merged", False),
+    ]
+    assert cases[1].result[0].message.startswith("it is merged: placed on r1")
+
+
+def test_junit_xml_tells_why_nothing_could_be_merged(replay: Program, tmp_path: Path) -> None:
+    (tmp_path / "empty.mcap").write_bytes(b"")
+    ran = checked(replay, tmp_path / "empty.mcap", "robots: {r2: merged}", "--junit", "out.xml")
+    assert ran.status == 2
+    (suite,) = JUnitXml.fromfile(str(replay.folder / "out.xml"))
+    (case,) = suite
+    assert suite.errors == 1
+    assert "empty.mcap" in case.result[0].message
+
+
+def test_junit_xml_holds_any_name(replay: Program, outcome: Path) -> None:
+    name = '"<&>\\"\\u0007😀]]>"'
+    ran = checked(replay, outcome, f"robots: {{{name}: merged}}", "--junit", "out.xml")
+    assert ran.status == 1
+    (suite,) = JUnitXml.fromfile(str(replay.folder / "out.xml"))
+    (case,) = suite
+    assert case.classname == '<&>"\\x07😀]]>'
+
+
+def test_outputs_repeat_to_the_byte(replay: Program, mixed: Path) -> None:
+    written = []
+    for _ in range(2):
+        checked(replay, mixed, "robots: {r2: unmerged}", "--junit", "out.xml", "--summary", "out.md")
+        written.append([(replay.folder / name).read_bytes() for name in ("out.xml", "out.md")])
+        (replay.folder / "out.md").unlink()
+    assert written[0] == written[1]
+
+
+def test_a_summary_is_appended_as_markdown(replay: Program, outcome: Path) -> None:
+    (replay.folder / "summary.md").write_text("what was there\n", encoding="utf-8")
+    ran = checked(replay, outcome, "robots:\n  r1: reference\n  r2: unmerged\n", "--summary", "summary.md")
+    assert ran.status == 1
+    text = (replay.folder / "summary.md").read_text(encoding="utf-8")
+    assert text.startswith("what was there\n### replay check: floor.mcap\n\n1 of 2 expectations does not hold\n")
+    rows = [line for line in text.splitlines() if line.startswith("| ")]
+    assert [row.split("|")[1:4] for row in rows[1:]] == [
+        [" ✗ ", " r2 ", " its status is unmerged "],
+        [" ✓ ", " r1 ", " its status is reference "],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "there is nothing in it"),
+        ("robots: [", "line 1: this is no YAML"),
+        ("robots: {}", "line 1: robots is {}; expected at least one robot"),
+        ("reference: r1", "it has no 'robots'"),
+        ("- r1", "is ['r1']; expected a mapping"),
+        ("robot: {r1: merged}", "line 1: robot: there is no key 'robot' here; did you mean 'robots'?"),
+        ("robots:\n  r2: marged", "line 2: robots.r2.status is 'marged'; expected one of reference, merged"),
+        (
+            "robots:\n  r2:\n    status: merged\n    min_acceptence: 1",
+            "line 4: robots.r2.min_acceptence: there is no key",
+        ),
+        ("robots: {r2: {status: merged, min_acceptance: 2}}", "is 2; expected a number from 0 to 1"),
+        ("robots: {r2: {status: merged, pose: {x_m: 1, y_m: 2}}}", "expected either yaw_deg or yaw_rad"),
+        ("robots: {r2: {status: merged, pose: {x_m: a, y_m: 2, yaw_deg: 1}}}", "pose.x_m is 'a'; expected a number"),
+        ("robots: {r2: {status: unmerged, pose: {x_m: 1, y_m: 2, yaw_deg: 1}}}", "no such key of a robot whose status"),
+        ("robots: {r2: {status: unmerged, reason: bad_luck}}", "expected reasons out of "),
+        ("robots: {r2: {status: merged, reason: accepted}}", "no reason of a robot that is to be merged"),
+        ("robots: {1: merged}", "expected a name: put it in quotes"),
+        ("robots: &a {r1: reference}\nx: *a", "refers to another value"),
+        ("max_skipped: -1\nrobots: {r1: reference}", "expected a whole number, 0 or more"),
+        ("max_skipped: {lost: 1}\nrobots: {r1: reference}", "there is no key 'lost' here"),
+        ("other_robots: no\nrobots: {r1: reference}", "expected one of allowed, forbidden"),
+        ("defaults: {status: merged}\nrobots: {r1: reference}", "there is no key 'status' here"),
+    ],
+)
+def test_what_is_wrong_in_an_expectation_is_named_before_anything_is_merged(
+    replay: Program, two: Path, text: str, said: str
+) -> None:
+    ran = checked(replay, two, text)
+    assert ran.status == 2
+    assert ran.error.startswith(f"{replay.folder / 'expect.yaml'}: ")
+    assert said in ran.error
+
+
+def test_limits_of_a_robot_come_before_defaults(replay: Program, outcome: Path) -> None:
+    text = "defaults: {min_overlap_m2: 10000}\nrobots: {r2: {status: merged, min_overlap_m2: 1}}"
+    assert checked(replay, outcome, text).status == 0
+
+
+def test_a_pose_is_compared_at_a_point_of_the_map(replay: Program, outcome: Path) -> None:
+    text = f"robots: {{r2: {{status: merged, pose: {{x_m: {TRUE.x_m}, y_m: {TRUE.y_m}, yaw_rad: {TRUE.yaw_rad + 0.02}, "
+    assert checked(replay, outcome, f"{text}within_m: 0.3, within_deg: 3}}}}}}").status == 0
+    assert checked(replay, outcome, f"{text}at_m: [100, 0], within_m: 0.3, within_deg: 3}}}}}}").status == 1
+
+
+def test_a_scale_counts_where_it_is_given(replay: Program, outcome: Path) -> None:
+    pose = POSE.replace("{", "{scale: 1.2, ")
+    assert checked(replay, outcome, f"robots: {{r2: {{status: merged, pose: {pose}}}}}").status == 1
+    pose = POSE.replace("{", "{scale: 1.001, ")
+    assert checked(replay, outcome, f"robots: {{r2: {{status: merged, pose: {pose}}}}}").status == 0
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        ((), "give either --expect EXPECT.yaml or --write-expect EXPECT.yaml"),
+        (("--expect", "a.yaml", "--write-expect", "b.yaml"), "give either"),
+        (("--write-expect", "b.yaml", "--junit", "c.xml"), "give them with --expect"),
+        (("--expect", "absent.yaml"), "absent.yaml: it does not exist"),
+    ],
+)
+def test_flags_that_do_not_fit_are_refused(replay: Program, two: Path, flags: tuple[str, ...], said: str) -> None:
+    ran = replay("check", two, *flags)
+    assert ran.status == 2
+    assert said in ran.error
+
+
+def test_a_summary_without_a_name_is_refused(replay: Program, outcome: Path) -> None:
+    assert "$GITHUB_STEP_SUMMARY" in checked(replay, outcome, "robots: {r1: reference}", "--summary", "").error
+
+
+@pytest.mark.parametrize("flag", ["--junit", "--summary"])
+def test_findings_do_not_replace_an_input(replay: Program, outcome: Path, flag: str) -> None:
+    content = outcome.read_bytes()
+    for path in (outcome, replay.folder / "expect.yaml"):
+        ran = checked(replay, outcome, "robots: {r1: reference}", flag, path)
+        assert ran.status == 2
+        assert "is an input" in ran.error
+    assert outcome.read_bytes() == content
+
+
+def test_nothing_is_left_where_findings_cannot_be_written(replay: Program, outcome: Path) -> None:
+    ran = checked(replay, outcome, "robots: {r1: reference}", "--junit", "absent/out.xml")
+    assert ran.status == 3
+    assert "there is no such folder" in ran.error
+
+
+def test_help_has_the_words_of_an_expectation() -> None:
+    ran = in_process_of_its_own("check", "--help")
+    assert "--write-expect" in ran.stdout
+    assert "exit status: 0" in ran.stdout

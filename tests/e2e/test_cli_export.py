@@ -1,0 +1,306 @@
+"""`replay export`: maps as map_server loads them, pictures and transforms, read back as their users would."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+from mapmerge.grid import Grid
+from mapmerge.sim2 import Sim2
+from replay.codec import decode
+from replay.messages import GridMessage
+from replay.sources import open_source
+from tests.bags import write_mcap, write_saved_map
+from tests.data_paths import ROOT
+from tests.outputs import maps
+from tests.program import Program
+from tests.runs import RESOLUTION_M, at, bare_room, flat_map, in_log_order, reference_from, seen, two_robots, updated
+
+MAP_SAVER = {"free": 254, "occupied": 0, "unknown": 205}
+
+
+def described(path: Path) -> dict[str, Any]:
+    return YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+
+
+def pixels(path: Path) -> np.ndarray:
+    found = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    assert found is not None
+    return found
+
+
+def loaded(path: Path) -> Grid:
+    """Return the map that replay reads a saved one as, which is how map_server does."""
+    with open_source(path) as source:
+        (raw,) = source.messages(["/map"])
+    message = decode(raw)
+    assert isinstance(message, GridMessage)
+    return message.grid
+
+
+def in_three(cells: np.ndarray) -> np.ndarray:
+    return np.select([cells < 0, cells <= 25, cells >= 65], [-1, 0, 100], -1)
+
+
+def test_the_merged_map_as_map_saver_writes_it(replay: Program, outcome: Path) -> None:
+    ran = replay("export", outcome)
+    merged = maps(outcome)[-1].grid
+    assert (ran.status, ran.out) == (0, "")
+    assert sorted(path.name for path in replay.folder.iterdir()) == ["floor.pgm", "floor.yaml"]
+    assert described(replay.folder / "floor.yaml") == {
+        "image": "floor.pgm",
+        "mode": "trinary",
+        "resolution": RESOLUTION_M,
+        "origin": pytest.approx([merged.map_from_grid.x_m, merged.map_from_grid.y_m, merged.map_from_grid.yaw_rad]),
+        "negate": 0,
+        "occupied_thresh": 0.65,
+        "free_thresh": 0.196,
+    }
+    image = pixels(replay.folder / "floor.pgm")
+    assert image.dtype == np.uint8
+    expected = np.select([merged.cells < 0, merged.cells <= 25, merged.cells >= 65], [205, 254, 0], 205)
+    assert np.array_equal(image, expected[::-1])
+    assert set(np.unique(image)) == set(MAP_SAVER.values())
+    assert (replay.folder / "floor.pgm").read_bytes().startswith(b"P5\n# ")
+
+
+def test_what_is_loaded_is_what_was_written(replay: Program, outcome: Path) -> None:
+    merged = maps(outcome)[-1].grid
+    for mode, cells in (("trinary", in_three(merged.cells)), ("scale", merged.cells), ("raw", merged.cells)):
+        assert replay("export", outcome, "--mode", mode, "-o", mode).status == 0
+        found = loaded(replay.folder / f"{mode}.yaml")
+        assert np.array_equal(found.cells, cells), mode
+        assert found.resolution_m == merged.resolution_m
+        assert found.map_from_grid.is_close(merged.map_from_grid, distance_m=1e-8, angle_rad=1e-8, at_m=(9.0, 9.0))
+
+
+def test_a_saved_map_can_be_merged_again(replay: Program, outcome: Path, two: Path) -> None:
+    assert replay("export", outcome, "-o", "old.yaml").status == 0
+    ran = replay.merge(f"old={replay.folder / 'old.yaml'}", two, "--robots", "old,r2")
+    assert ran.statuses == {"old": "reference", "r2": "merged"}
+    pose, true = ran.robots["r2"]["merged_from_map"], reference_from("r2")
+    assert math.hypot(pose["x_m"] - true.x_m, pose["y_m"] - true.y_m) < 0.1
+
+
+def test_turned_origins_are_kept_and_named(replay: Program, tmp_path: Path) -> None:
+    turned = Grid(flat_map("r1").cells, RESOLUTION_M, Sim2(-3.25, 12.5, 0.7))
+    run = write_mcap(
+        tmp_path / "turned.mcap", [seen("r1", 0.0, turned, turn=(0.0, 0.0, math.sin(0.35), math.cos(0.35)))]
+    )
+    ran = replay("export", run)
+    assert "its origin is turned by 40.11°" in ran.err
+    assert described(replay.folder / "turned.yaml")["origin"] == pytest.approx([-3.25, 12.5, 0.7])
+
+
+def test_as_of_a_time(replay: Program, outcome: Path) -> None:
+    every = maps(outcome)
+    for name, time in (("early", "5"), ("same", f"{at(5.0)}ns"), ("late", "99")):
+        assert replay("export", outcome, "--at", time, "-o", name, "--mode", "raw").status == 0
+    early = [each.grid for each in every if each.stamp_ns <= at(5.0)][-1]
+    assert np.array_equal(loaded(replay.folder / "early.yaml").cells, early.cells)
+    assert np.array_equal(loaded(replay.folder / "same.yaml").cells, early.cells)
+    assert np.array_equal(loaded(replay.folder / "late.yaml").cells, every[-1].grid.cells)
+    assert "no map by that time" in replay("export", outcome, "--at", "1ns", "-o", "never").error
+
+
+def test_any_map_of_any_recording_with_its_updates(replay: Program, tmp_path: Path) -> None:
+    patch = np.full((4, 5), 100, np.int8)
+    run = write_mcap(tmp_path / "run.mcap", [seen("r1", 0.0), updated("r1", 1.0, 3, 2, patch), seen("r2", 2.0)])
+    ran = replay("export", run)
+    assert ran.status == 2
+    assert "--topic /r1/map  --topic /r2/map" in ran.error
+    assert replay("export", run, "--topic", "/r1/map", "--mode", "raw").status == 0
+    expected = flat_map("r1").cells.copy()
+    expected[2:6, 3:8] = 100
+    assert np.array_equal(loaded(replay.folder / "run.yaml").cells, expected)
+    assert "there are: /r1/map, /r2/map" in replay("export", run, "--topic", "/r3/map").error
+
+
+def test_a_picture_in_the_colours_of_rviz(replay: Program, outcome: Path) -> None:
+    assert replay("export", outcome, "--to", "png", "-o", "floor.png").status == 0
+    cells, image = maps(outcome)[-1].grid.cells[::-1], pixels(replay.folder / "floor.png")
+    assert image.shape == (*cells.shape, 3)
+    assert (image[cells < 0] == (134, 137, 112)).all()
+    assert (image[cells == 0] == 255).all()
+    assert (image[cells == 100] == 0).all()
+
+
+def test_robots_own_maps_lie_on_the_merged_one(replay: Program, outcome: Path, two: Path) -> None:
+    merged = maps(outcome)[-1].grid
+    assert replay("export", outcome, "--robots", "r1,r2", "--mode", "raw").status == 0
+    first, second = (loaded(replay.folder / f"floor.{robot}.yaml") for robot in ("r1", "r2"))
+    assert first.cells.shape == second.cells.shape == merged.cells.shape
+    either = (first.cells >= 0) | (second.cells >= 0)
+    contradicted = (merged.cells < 0) & either
+    assert not (merged.cells[~either] >= 0).any()
+    assert (np.abs(first.cells[contradicted].astype(int) - second.cells[contradicted]) == 100).all()
+    alone = (first.cells >= 0) & (second.cells < 0)
+    assert alone.any()
+    assert np.array_equal(first.cells[alone], merged.cells[alone])
+    # nothing is interpolated: what is there was there before
+    assert set(np.unique(second.cells)) <= set(np.unique(flat_map("r2").cells)) | {-1}
+    for source in (outcome, outcome.with_suffix(".json")):
+        ran = replay("export", source, "--robots", "r2", "--maps", two, "--mode", "raw", "-o", "again", "--force")
+        assert ran.status == 0, ran.err
+        assert loaded(replay.folder / "again.yaml").same_as(second)
+
+
+def test_robots_maps_as_of_a_time(replay: Program, outcome: Path, two: Path) -> None:
+    for number, more in enumerate(((), ("--maps", two))):
+        ran = replay("export", outcome, "--robots", "r1", "--at", "5", "--mode", "raw", "-o", f"out{number}", *more)
+        assert ran.status == 0, ran.err
+    early, other = (loaded(replay.folder / f"out{number}.yaml") for number in range(2))
+    assert early.same_as(other)
+    assert 0 < (early.cells >= 0).sum() < (flat_map("r1").cells >= 0).sum()
+
+
+def test_maps_are_those_that_were_merged_though_the_recording_goes_on(replay: Program, two: Path) -> None:
+    replay.merge(two, "--stop", "13")
+    for number, more in enumerate(((), ("--at", "13"))):
+        flags = ("--robots", "r1", "--maps", two, "-o", f"out{number}")
+        assert replay("export", "out.mcap", *flags, *more).status == 0
+    assert (replay.folder / "out0.pgm").read_bytes() == (replay.folder / "out1.pgm").read_bytes()
+
+
+def test_what_is_missing_for_robots_maps_is_said(replay: Program, two: Path, tmp_path: Path) -> None:
+    mixed = write_mcap(tmp_path / "mixed.mcap", in_log_order(two_robots(), [seen("r3", 30.0, bare_room())]))
+    out = replay.merge(mixed).mcap
+    assert "as --maps run.mcap, or merge again with --copy-maps" in replay("export", out, "--robots", "r2").error
+    assert "r3 is not placed: " in replay("export", out, "--robots", "r3", "--maps", mixed).error
+    assert "there are r1, r2, r3" in replay("export", out, "--robots", "r9").error
+    assert "mixed.mcap was merged as well" in replay("export", out, "--robots", "r2", "--maps", two).error
+    assert "a report holds no map" in replay("export", out.with_suffix(".json")).error
+    assert "say whose" in replay("export", out, "--maps", mixed).error
+    assert "leave it out" in replay("export", out, "--robots", "r1", "--topic", "/merged/map").error
+
+
+def test_transforms_are_commands_for_the_shell(replay: Program, tmp_path: Path) -> None:
+    mixed = write_mcap(tmp_path / "mixed.mcap", in_log_order(two_robots(), [seen("r3", 30.0, bare_room())]))
+    out = replay.merge(mixed)
+    ran = replay("export", out.mcap, "--to", "tf")
+    assert (ran.status, ran.err) == (0, "")
+    _, *lines, unplaced = ran.out.splitlines()
+    assert unplaced.startswith("# r3 is not placed: ")
+    assert replay("export", out.report_path, "--to", "tf").out.splitlines()[1:] == [*lines, unplaced]
+    for robot, line in zip(("r1", "r2"), lines, strict=True):
+        words = shlex.split(line)
+        assert words[:4] == ["ros2", "run", "tf2_ros", "static_transform_publisher"]
+        flags = dict(zip(words[4::2], words[5::2], strict=True))
+        pose = out.robots[robot]["merged_from_map"]
+        assert (flags["--frame-id"], flags["--child-frame-id"]) == ("merged", out.robots[robot]["map_frame"])
+        found = [float(flags[flag]) for flag in ("--x", "--y", "--yaw")]
+        assert found == pytest.approx([pose["x_m"], pose["y_m"], pose["yaw_rad"]], abs=1e-6)
+        assert [flags[flag] for flag in ("--z", "--pitch", "--roll")] == ["0", "0", "0"]
+
+
+def test_transforms_for_ros_1_and_of_some_robots_and_to_a_file(replay: Program, outcome: Path) -> None:
+    ran = replay("export", outcome, "--to", "tf", "--ros", "1", "--robots", "r2", "-o", "tf.sh")
+    assert (ran.status, ran.out) == (0, "")
+    comment, line = (replay.folder / "tf.sh").read_text(encoding="utf-8").splitlines()
+    assert comment.startswith("# floor.mcap: ")
+    number = r"-?\d+\.\d{6}"
+    command = rf"rosrun tf2_ros static_transform_publisher {number} {number} 0 {number} 0 0 merged r2/map"
+    assert re.fullmatch(command, line)
+
+
+def test_transforms_as_of_a_time(replay: Program, outcome: Path) -> None:
+    ran = replay("export", outcome, "--to", "tf", "--at", "1")
+    assert "# r2 is not placed" in ran.out
+    assert "final report alone" in replay("export", outcome.with_suffix(".json"), "--to", "tf", "--at", "1").error
+
+
+def test_a_scale_is_no_transform(replay: Program, outcome: Path) -> None:
+    report = json.loads(outcome.with_suffix(".json").read_text(encoding="utf-8"))
+    report["robots"]["r2"]["merged_from_map"]["scale"] = 1.25
+    report["robots"]["r1"]["map_frame"] = "map; rm -rf"
+    (replay.folder / "scaled.json").write_text(json.dumps(report), encoding="utf-8")
+    _, first, second = replay("export", "scaled.json", "--to", "tf").out.splitlines()
+    assert second.startswith("# r2 is placed with a scale of 1.250000, which no transform can say")
+    assert shlex.split(first)[-1] == "map; rm -rf"
+
+
+def test_nothing_is_replaced_unless_that_is_said(replay: Program, outcome: Path) -> None:
+    (replay.folder / "floor.yaml").write_text("mine", encoding="utf-8")
+    assert "there is already" in replay("export", outcome).error
+    assert [path.name for path in replay.folder.iterdir()] == ["floor.yaml"]
+    assert replay("export", outcome, "--force").status == 0
+    assert sorted(path.name for path in replay.folder.iterdir()) == ["floor.pgm", "floor.yaml"]
+
+
+def test_no_input_is_replaced(replay: Program, tmp_path: Path) -> None:
+    saved = write_saved_map(tmp_path / "saved.yaml", np.full((4, 4), 254, np.uint8), "saved.pgm")
+    content = (tmp_path / "saved.pgm").read_bytes()
+    for name in ("saved", "saved.yaml", "saved.pgm"):
+        ran = replay("export", saved, "-o", name, "--force")
+        assert ran.status == 2
+        assert "is an input" in ran.error
+    assert (tmp_path / "saved.pgm").read_bytes() == content
+
+
+def test_both_files_or_none(replay: Program, outcome: Path) -> None:
+    (replay.folder / "floor.yaml").mkdir()
+    ran = replay("export", outcome, "--force")
+    assert ran.status == 3
+    assert [path.name for path in replay.folder.iterdir()] == ["floor.yaml"]
+    assert "there is no such folder" in replay("export", outcome, "-o", "absent/floor").error
+
+
+@pytest.mark.parametrize("name", ["floor", "floor.yaml", "floor.pgm"])
+def test_a_name_may_have_its_ending(replay: Program, outcome: Path, name: str) -> None:
+    assert replay("export", outcome, "-o", name).status == 0
+    assert sorted(path.name for path in replay.folder.iterdir()) == ["floor.pgm", "floor.yaml"]
+
+
+@pytest.mark.parametrize("name", ["floor.v2", "a floor: 1", "étage", "no", "#1"])
+def test_any_name_leads_to_its_image(replay: Program, outcome: Path, name: str) -> None:
+    assert replay("export", outcome, "-o", name, "--mode", "raw").status == 0
+    assert described(replay.folder / f"{name}.yaml")["image"] == f"{name}.pgm"
+    assert loaded(replay.folder / f"{name}.yaml").cells.shape == maps(outcome)[-1].grid.cells.shape
+
+
+def test_exports_repeat_to_the_byte(replay: Program, outcome: Path) -> None:
+    written = []
+    for _ in range(2):
+        for target in ("map_server", "png"):
+            assert replay("export", outcome, "--to", target, "--force").status == 0
+        written.append({path.name: path.read_bytes() for path in replay.folder.iterdir()})
+    assert written[0] == written[1]
+
+
+def test_a_map_that_cannot_be_used_is_left_out_and_named(replay: Program, tmp_path: Path) -> None:
+    run = write_mcap(tmp_path / "run.mcap", [seen("r1", 0.0), seen("r1", 1.0, bare_room(), resolution=0.0)])
+    ran = replay("export", run, "--mode", "raw")
+    assert ran.status == 0
+    assert "replay: skipped (run.mcap, /r1/map at " in ran.err
+    assert "bad_resolution" in ran.err
+    assert np.array_equal(loaded(replay.folder / "run.yaml").cells, flat_map("r1").cells)
+
+
+def test_maps_of_a_recording_for_each_robot(replay: Program) -> None:
+    runs = [ROOT / "samples/bag_per_robot" / name for name in ("alpha", "bravo")]
+    out = replay.merge(*runs).mcap
+    maps_of = [flag for run in runs for flag in ("--maps", run)]
+    assert "bravo was merged as well" in replay("export", out, "--robots", "alpha", "--maps", runs[0]).error
+    ran = replay("export", out, "--robots", "alpha,bravo", *maps_of, "--mode", "raw")
+    assert ran.status == 0, ran.err
+    merged = maps(out)[-1].grid.cells
+    known = [loaded(replay.folder / f"out.{run.name}.yaml").cells >= 0 for run in runs]
+    assert known[0].shape == merged.shape
+    # the poses of a report are rounded, so that a cell may lie beside the one that it was merged from
+    assert (known[0] | known[1])[merged >= 0].mean() > 0.999
+
+
+@pytest.mark.parametrize("content", [b"", b"nothing", b"\x89MCAP0\r\n"])
+def test_what_is_no_recording_is_refused(replay: Program, content: bytes) -> None:
+    (replay.folder / "bad.mcap").write_bytes(content)
+    assert replay("export", "bad.mcap").error.startswith("bad.mcap: ")
+    assert replay("export", "bad.mcap", "--to", "tf").error.startswith("bad.mcap: ")
