@@ -14,19 +14,12 @@ from replay.sources.boundary import COPY_AGAIN
 from replay.sources.lapses import AT_END, LATEST, Lapse, Written
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import TooLargeError
+from replay.sources.sqlite3.header import Header
+from replay.sources.sqlite3.page import Cell
+from replay.sources.sqlite3.pages import Gap, Leaves, Pages
 from replay.sources.sqlite3.places import Places, own_places, told_places
-from replay.sources.sqlite3.salvage import (
-    BadPageError,
-    Cell,
-    Gap,
-    Header,
-    Leaves,
-    Pages,
-    Table,
-    Value,
-    layout_of,
-    record_of,
-)
+from replay.sources.sqlite3.record import BadPageError, Value, layout_of, record_of
+from replay.sources.sqlite3.schema import Table
 from replay.sources.topics import normalised_type
 from replay.words import counted
 
