@@ -24,7 +24,9 @@ from replay.sources.losses import Loss, Losses
 from replay.sources.memory import MOST_BYTES, TooLargeError
 from replay.sources.sqlite3.beside import beside, plain_file
 from replay.sources.sqlite3.header import read_header
-from replay.sources.sqlite3.rows import BadRowError, BagTables, NoBagError, Record, Row, SqliteTables, salvaged_tables
+from replay.sources.sqlite3.salvaged_tables import salvaged_tables
+from replay.sources.sqlite3.sqlite_tables import SqliteTables
+from replay.sources.sqlite3.tables import BadRowError, BagTables, NoBagError, Record, Row
 from replay.sources.topics import normalised_type, topic_table, type_in
 from replay.sources.zstd import ZstdError, decompressed_cdr
 
