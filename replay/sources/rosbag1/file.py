@@ -18,9 +18,10 @@ from replay.sources.lapses import AT_END, lapse_of
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import MOST_BYTES
 from replay.sources.rosbag1.chunks import Chunk, read_chunk, records_in
+from replay.sources.rosbag1.contents import BagFile, Contents, Entry
 from replay.sources.rosbag1.index import Index, UnusableIndexError, read_index
 from replay.sources.rosbag1.records import BAG_HEADER, CONNECTION, MESSAGE, Record, record_in, record_of
-from replay.sources.rosbag1.scan import BagFile, Contents, Entry, Scan
+from replay.sources.rosbag1.scan import Scan
 from replay.sources.topics import topic_table
 
 _MAGIC = b"#ROSBAG V"
