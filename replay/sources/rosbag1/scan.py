@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from replay.skip_cause import SkipCause
-from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
+from replay.sources.base import DECODED_TYPES
 from replay.sources.lapses import Place, Written
 from replay.sources.losses import Loss, Losses
 from replay.sources.rosbag1.chunk_places import SURE_OUTER, chunk_place, is_unfinished_at
@@ -34,7 +34,6 @@ from replay.sources.rosbag1.records import (
 )
 from replay.sources.topics import normalised_type
 
-_USED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 _MOST_DEFINITION_BYTES = 1 << 24
 
 
@@ -208,7 +207,7 @@ class Scan:
         self._counts[key] += 1
         topic = self.topics.get(key)
         # of a connection that is not known yet, it may be
-        if topic is None or topic.msgtype in _USED_TYPES or key in self._kept:
+        if topic is None or topic.msgtype in DECODED_TYPES or key in self._kept:
             self._found.setdefault(key, array("Q")).extend(entry[:3])
 
     def _name_losses(self) -> None:

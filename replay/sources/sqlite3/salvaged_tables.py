@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import BinaryIO
 
 from replay.skip_cause import SkipCause
-from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
+from replay.sources.base import DECODED_TYPES
 from replay.sources.boundary import COPY_AGAIN
 from replay.sources.lapses import AT_END, Written
 from replay.sources.losses import Loss, Losses
@@ -23,8 +23,6 @@ from replay.sources.sqlite3.schema import Table
 from replay.sources.sqlite3.tables import BadRowError, NoBagError, Record, Row
 from replay.sources.topics import normalised_type
 from replay.words import counted
-
-_USED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 
 # what the record of a message has besides its data, at most
 _MOST_BESIDE_BYTES = 64
@@ -239,4 +237,4 @@ def _is_message(table: Table, cell: Cell, topic_ids: Collection[Value]) -> bool:
 def _used_topic(row: Record) -> int | None:
     """Return the id of a topic whose messages may be asked for: of maps and transforms."""
     key, msgtype = row.get("id"), row.get("type")
-    return key if isinstance(key, int) and normalised_type(str(msgtype)) in _USED_TYPES else None
+    return key if isinstance(key, int) and normalised_type(str(msgtype)) in DECODED_TYPES else None
