@@ -16,10 +16,9 @@ from replay.sources.boundary import COPY_AGAIN
 from replay.sources.lapses import AT_END, Place, Written
 from replay.sources.losses import Loss
 from replay.sources.mcap.channels import Channel
-from replay.sources.mcap.chunk import BadPart
 from replay.sources.mcap.index import NO_CHUNK
 from replay.sources.mcap.record_file import RecordFile, indexed_counts
-from replay.sources.mcap.records import HEADER, MAGIC
+from replay.sources.mcap.records import HEADER, MAGIC, BadPart
 from replay.sources.mcap.summary import Contents, Summary, statistics_between
 from replay.sources.mcap.walk import Walk
 from replay.words import counted

@@ -15,14 +15,7 @@ from replay.skip_cause import SkipCause
 from replay.sources.lapses import Written, lapse_of
 from replay.sources.losses import Loss
 from replay.sources.mcap.channels import Channel, ChannelTable, check_description
-from replay.sources.mcap.chunk import (
-    BadPart,
-    chunk_content,
-    cut_chunk_content,
-    describes,
-    inner_records,
-    inside_of,
-)
+from replay.sources.mcap.chunk import chunk_content, cut_chunk_content, describes, inner_records, inside_of
 from replay.sources.mcap.chunk_ends import ChunkEnds
 from replay.sources.mcap.index import NO_CHUNK, Entry
 from replay.sources.mcap.losses import Unusable, damaged
@@ -32,6 +25,7 @@ from replay.sources.mcap.records import (
     CHUNK,
     MESSAGE,
     SCHEMA,
+    BadPart,
     MessageHeader,
     Record,
     message_header,
