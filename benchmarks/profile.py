@@ -26,9 +26,9 @@ REST, PREPARING, RERUN, IMAGES = "rest", "preparing maps", "writing .rrd", "imag
 WHOLE = frozenset({PREPARING, RERUN, IMAGES})
 PARTS: Mapping[str, str] = {
     r"<frozen importlib": "starting",
-    r"\bcount \(replay/arrivals\.py": "digests of the input",
+    r"\bcount \(replay/feeds\.py": "digests of the input",
     r"\(replay/sources/": "reading",
-    r"\(replay/(codec/de|assemble|arrivals|timeline)": "decoding, putting in order",
+    r"\(replay/(codec/de|assemble|arrivals|feeds|message_times|timeline)": "decoding, putting in order",
     r"\bprepare \(mapmerge/|\(mapmerge/(prepare|walls)\.py": PREPARING,
     r"\(mapmerge/(match/|pairs|jump|watch|align|polish|score|verify|graph|unite)": "matching",
     r"\(mapmerge/(fuse|odds|warp)": "fusing",

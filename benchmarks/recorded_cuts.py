@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.data import data_folder, read_truth
 from mapmerge.grid import Grid
 from mapmerge.sim2 import IDENTITY, Points, Sim2
-from replay.arrivals import Tally
+from replay.feeds import Tally
 from replay.options import RunOptions
 from replay.plan import open_plan
 from replay.runs import RunPath

@@ -16,7 +16,7 @@ from replay.skip_cause import SkipCause
 from replay.sources.boundary import OF_LIBRARIES
 from replay.sources.losses import Loss
 from replay.sources.mcap.channels import NO_SCHEMA
-from replay.sources.mcap.chunk import BadPart, chunk_content, cut_chunk_content, inner_records
+from replay.sources.mcap.chunk import chunk_content, cut_chunk_content, inner_records
 from replay.sources.mcap.record_file import RecordFile
 from replay.sources.mcap.records import (
     ATTACHMENT,
@@ -28,6 +28,7 @@ from replay.sources.mcap.records import (
     MESSAGE_HEAD,
     METADATA,
     SCHEMA,
+    BadPart,
     MessageHeader,
     Record,
     foreign_errors,

@@ -13,11 +13,11 @@ from mapmerge.errors import MapMergeError
 from mapmerge.merger import Merger
 from mapmerge.prior import Prior
 from replay import __version__
-from replay.arrivals import Tally
 from replay.background import Courier, ReadAhead
 from replay.beliefs import Beliefs
 from replay.errors import InputError
 from replay.events import Event, Finished, Merged, Noted, Skipped, Started, Timing
+from replay.feeds import Tally
 from replay.footprint import enough_memory
 from replay.gallery import Gallery
 from replay.no_map import losses_of, none_used

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from replay.arrivals import Feed, Tally, Window
 from replay.clocks import Probe, agreed, frames, offsets_ns, probe, refuse_recorded_twice
 from replay.errors import UsageError
 from replay.events import Clock, RobotInput
+from replay.feeds import Feed, Tally, Window
 from replay.footprint import MemoryLimit
 from replay.init_pose import refuse_unfit
 from replay.no_map import refuse_mapless

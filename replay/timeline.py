@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from mapmerge.grid import Grid
-from replay.arrivals import Arrival, Feed, KnownMap, Tally, Window, in_order
+from replay.arrivals import Arrival, KnownMap, in_order
 from replay.errors import BadMessage, InputError
 from replay.events import Noted, Skipped
+from replay.feeds import Feed, Tally, Window
 from replay.messages import FrameLink, TransformMessage
 from replay.skip_cause import SkipCause
 from replay.sources.base import Source

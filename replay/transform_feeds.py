@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from replay.arrivals import Feed
 from replay.clocks import Probe
 from replay.events import Clock
+from replay.feeds import Feed
 from replay.options import ClockChoice
 from replay.sources.base import TF_TYPES, Source
 

@@ -19,9 +19,9 @@ from benchmarks.faults.remembered import RememberingMerger
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from replay import pipeline
-from replay.arrivals import Feed
 from replay.errors import ReplayError, UsageError
 from replay.events import Merged, Skipped
+from replay.feeds import Feed
 from replay.options import RunOptions
 from replay.plain_text import plain
 from replay.plan import Plan, open_plan

@@ -18,6 +18,8 @@ UPDATE_TYPE = "map_msgs/msg/OccupancyGridUpdate"
 TF_TYPE = "tf2_msgs/msg/TFMessage"
 TF_TYPES = (TF_TYPE, "tf/msg/tfMessage")
 """Types of transforms: that of ROS 2 and of ROS 1, and the one of ROS 1 before tf2."""
+DECODED_TYPES = frozenset({GRID_TYPE, UPDATE_TYPE, *TF_TYPES})
+"""Types of all messages that are ever decoded."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ class TestShares:
 
     def test_helpers_work_for_their_callers(self):
         assert part_of("decode (replay/codec/decode.py:47)") == "decoding, putting in order"
-        assert part_of("Tally.count (replay/arrivals.py:61)") == "digests of the input"
+        assert part_of("Tally.count (replay/feeds.py:61)") == "digests of the input"
         assert part_of("apply (mapmerge/sim2.py:70)") is None
         assert part_of("_count_dispatcher (numpy/lib/arraysetops.py:3)") is None
 

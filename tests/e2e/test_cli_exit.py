@@ -136,7 +136,7 @@ def test_a_bug_ends_with_a_status_and_a_word(replay: Program, two: Path, monkeyp
     [
         "replay.sources.mcap.chunk_reader.message_data",
         "replay.sinks.mcap_file.McapSink._tick",
-        "replay.arrivals.assemble",
+        "replay.feeds.assemble",
         "replay.sinks.json_file.report_text",
     ],
 )
@@ -169,7 +169,7 @@ def no_memory_for_numpy(*_: object, **__: object) -> object:
     [
         ("mapmerge.merger.Merger.step", "the maps of r"),
         ("replay.gallery.Gallery.due", "the maps of r"),
-        ("replay.arrivals.assemble", "there is not enough memory"),
+        ("replay.feeds.assemble", "there is not enough memory"),
     ],
 )
 @pytest.mark.parametrize("greedy", [no_memory_for_python, no_memory_for_numpy])

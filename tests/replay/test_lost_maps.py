@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from replay.arrivals import Tally
 from replay.events import Skipped
+from replay.feeds import Tally
 from replay.options import RunOptions
 from replay.plan import open_plan
 from replay.runs import RunPath

@@ -27,7 +27,7 @@ from replay.skip_cause import SkipCause
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE, TF_TYPE, RawMessage, SourceInfo
 from replay.sources.losses import Loss
-from replay.sources.mcap import walk as mcap_walk
+from replay.sources.mcap import resume
 from replay.sources.mcap.file import McapFile
 from replay.sources.mcap.records import MAGIC
 from tests import bags
@@ -653,9 +653,9 @@ def test_records_of_private_and_later_types_are_passed_over(tmp_path: Path) -> N
 def test_the_search_for_the_next_record_takes_a_step_a_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What looks like a record everywhere is looked at once."""
     looked: Counter[int] = Counter()
-    original = mcap_walk.Walk._is_chain
+    original = resume.Resumption._is_chain
     monkeypatch.setattr(
-        mcap_walk.Walk, "_is_chain", lambda self, start: (looked.update([start]), original(self, start))[1]
+        resume.Resumption, "_is_chain", lambda self, start: (looked.update([start]), original(self, start))[1]
     )
     trap = struct.pack("<BQ", 5, 1 << 31) * 20_000
     path = _file(tmp_path / "a.mcap", _described() + _message(1, 5) + trap + _message(1, 6) * 3)

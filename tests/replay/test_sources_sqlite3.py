@@ -16,7 +16,7 @@ from replay.errors import InputError
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE
 from replay.sources.losses import Loss
-from replay.sources.sqlite3.salvage import BadPageError, layout_of
+from replay.sources.sqlite3.record import BadPageError, layout_of
 from tests import bags
 from tests.replay.test_sources_open import refused
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from mapmerge.grid import Grid
-from replay.arrivals import Feed, Tally, Window
 from replay.errors import InputError
 from replay.events import Clock, Noted, Skipped
+from replay.feeds import Feed, Tally, Window
 from replay.sources.base import TF_TYPE
 from replay.stamps import LAST_NS
 from replay.timeline import _MOST_HELD, Tick, Transforms, ticks

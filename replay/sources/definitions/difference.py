@@ -14,7 +14,8 @@ import functools
 from typing import TYPE_CHECKING, Literal
 
 from replay.sources.base import TF_TYPE, TF_TYPES
-from replay.sources.definitions.text import Fields, NoDefinitionError, stated_fields
+from replay.sources.definitions.fields import Fields, NoDefinitionError
+from replay.sources.definitions.text import stated_fields
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

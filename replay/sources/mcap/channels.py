@@ -9,7 +9,7 @@ import struct
 from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
-from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
+from replay.sources.base import DECODED_TYPES, GRID_TYPE, TF_TYPES, UPDATE_TYPE
 from replay.sources.definitions.difference import LARGEST_CHARS, differing_field
 from replay.sources.mcap.records import CHANNEL, SCHEMA, Record
 from replay.sources.topics import ENCODINGS, normalised_type, type_in
@@ -23,7 +23,6 @@ _MOST_DESCRIPTION_BYTES = 1 << 24
 _MOST_DESCRIPTIONS_BYTES = 1 << 26
 _BYTES_A_CHARACTER = 4
 
-_DEFINED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 _DEFINITION_ENCODINGS = {"ros2msg", "ros1msg", "ros2idl", "omgidl"}
 
 
@@ -108,7 +107,7 @@ class ChannelTable:
             fields = _Fields(content)
             key, name, encoding, definition = fields.number(), fields.text(), fields.text(), fields.block()
             # of other types it is never looked at
-            is_used = normalised_type(name) in _DEFINED_TYPES
+            is_used = normalised_type(name) in DECODED_TYPES
             # so much of a longer one that it is seen to be too long
             kept = definition[: _BYTES_A_CHARACTER * LARGEST_CHARS + 1] if is_used else b""
             if key:
@@ -205,7 +204,7 @@ def _channel(described: _Described, schema: _Schema | None, *, is_copied: bool) 
     if schema is None:
         return Channel(topic, type_in(encoding, ""), encoding, NO_SCHEMA)
     msgtype = type_in(encoding, schema.name)
-    if msgtype in _DEFINED_TYPES and schema.encoding in _DEFINITION_ENCODINGS and not is_copied:
+    if msgtype in DECODED_TYPES and schema.encoding in _DEFINITION_ENCODINGS and not is_copied:
         text = schema.definition.decode(errors="replace")
         difference = differing_field(msgtype, text, 1 if encoding == "ros1" else 2)
         if difference is not None:

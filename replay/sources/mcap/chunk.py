@@ -3,8 +3,7 @@
 A chunk is used as a whole or not at all, because its checksum says only that something in it is wrong. The one at which
 a file was cut off has none that could be checked: of it, all whole records are used that can be decompressed.
 
-No size is believed: what is decompressed is counted, and given up on once it is more than the largest chunk that is
-read.
+No size is believed: what is decompressed is given up on once it is more than the largest chunk that is read.
 """
 
 from __future__ import annotations
@@ -12,30 +11,28 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator
-from io import BytesIO
 from typing import NamedTuple
 
 from replay.skip_cause import SkipCause
+from replay.sources.mcap.decompress import COMPRESSIONS, decompressed
 from replay.sources.mcap.record_file import RecordFile
-from replay.sources.mcap.records import CHANNEL, CHUNK, MESSAGE, MESSAGE_HEAD, RECORD, SCHEMA, Record, message_header
+from replay.sources.mcap.records import (
+    CHANNEL,
+    CHUNK,
+    MESSAGE,
+    MESSAGE_HEAD,
+    RECORD,
+    SCHEMA,
+    BadPart,
+    Record,
+    message_header,
+)
 from replay.sources.memory import over_memory
 
 _HEAD = struct.Struct("<QQQII")
 _LENGTH = struct.Struct("<Q")
-_COMPRESSIONS = {b"", b"lz4", b"zstd"}
 _INNER = {SCHEMA, CHANNEL, MESSAGE}
 _PRIVATE = 0x80
-# larger steps take longer: their memory is asked of the system anew each time
-_STEP_BYTES = 1 << 18
-
-
-class BadPart(Exception):
-    """A part of a file cannot be used."""
-
-    def __init__(self, cause: SkipCause, detail: str) -> None:
-        super().__init__(detail)
-        self.cause = cause
-        self.detail = detail
 
 
 class ChunkHead(NamedTuple):
@@ -73,7 +70,7 @@ def is_consistent(record: Record, content: bytes) -> bool:
 def seems_a_chunk(record: Record, content: bytes) -> bool:
     """Tell whether a record of another type says of itself what only chunks do, from how its content begins."""
     head = chunk_head(content)
-    return head is not None and head.compression in _COMPRESSIONS and is_consistent(record, content)
+    return head is not None and head.compression in COMPRESSIONS and is_consistent(record, content)
 
 
 def chunk_content(file: RecordFile, start: int) -> tuple[bytes, bool]:
@@ -96,7 +93,7 @@ def chunk_content(file: RecordFile, start: int) -> tuple[bytes, bool]:
     file.file.seek(record.content + head.head_bytes)
     # More than it should have is wrong as soon as it is seen: little data may grow to very much.
     most_bytes = min(head.size, file.most_bytes)
-    plain = _joined(_decompressed(head.compression, file.file.read(head.data_bytes), most_bytes))
+    plain = decompressed(head.compression, file.file.read(head.data_bytes), most_bytes)
     if head.compression and len(plain) > most_bytes:
         if most_bytes == file.most_bytes:
             raise _too_large(file)
@@ -125,7 +122,7 @@ def cut_chunk_content(file: RecordFile, start: int) -> bytes:
     stop = file.written if head.compression else file.size
     file.file.seek(at)
     data = file.file.read(max(0, min(stop - at, file.most_bytes)))
-    plain = _joined(_decompressed(head.compression, data, file.most_bytes))
+    plain = decompressed(head.compression, data, file.most_bytes)
     # Zeros may be of a message, or may never have been written.
     written = len(plain) if head.compression else file.written - at
     return plain[: _end_of_whole(plain, written)]
@@ -214,68 +211,5 @@ def _records(content: bytes) -> Iterator[Record]:
         start = inner + length
 
 
-def _joined(pieces: Iterator[bytes]) -> bytes:
-    """Return pieces as one, in the memory of one: each is let go of before the next one comes."""
-    first = next(pieces, b"")
-    second = next(pieces, None)
-    if second is None:
-        return first
-    joined = BytesIO()
-    joined.write(first)
-    joined.write(second)
-    del first, second
-    for piece in pieces:
-        joined.write(piece)
-    return joined.getvalue()
-
-
 def _too_large(file: RecordFile) -> BadPart:
     return BadPart(SkipCause.OVER_MEMORY, over_memory(file.most_bytes))
-
-
-def _decompressed(compression: bytes, data: bytes, most_bytes: int) -> Iterator[bytes]:
-    """Yield what is in the data in pieces, up to a little more than so many bytes; what is not compressed at once."""
-    from zstandard import ZstdError
-
-    if compression not in _COMPRESSIONS:
-        name = compression.decode(errors="replace")
-        raise BadPart(SkipCause.DAMAGED, f"its compression is '{name}', not lz4, zstd or none")
-    if not compression:
-        yield data
-        return
-    steps = _zstd_steps(data) if compression == b"zstd" else _lz4_steps(data)
-    left = most_bytes
-    try:
-        for step in steps:
-            yield step
-            left -= len(step)
-            if left < 0:
-                return
-    # RuntimeError is lz4's
-    except (ZstdError, RuntimeError) as error:
-        found = " ".join(str(error).split())
-        if "allocation" in found.lower():
-            # which says nothing about the recording
-            raise MemoryError(found) from error
-        raise BadPart(SkipCause.DAMAGED, f"it cannot be decompressed ({found})") from error
-
-
-def _zstd_steps(data: bytes) -> Iterator[bytes]:
-    from zstandard import ZstdDecompressor
-
-    with ZstdDecompressor().stream_reader(data, read_across_frames=True) as reader:
-        while step := reader.read(_STEP_BYTES):
-            yield step
-
-
-def _lz4_steps(data: bytes) -> Iterator[bytes]:
-    from lz4.frame import LZ4FrameDecompressor
-
-    while data:
-        decompressor = LZ4FrameDecompressor()
-        step, data = decompressor.decompress(data, _STEP_BYTES), b""
-        while step or not (decompressor.eof or decompressor.needs_input):
-            yield step
-            step = b"" if decompressor.eof else decompressor.decompress(b"", _STEP_BYTES)
-        if decompressor.eof:
-            data = decompressor.unused_data or b""

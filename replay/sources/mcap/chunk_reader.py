@@ -6,10 +6,10 @@ from collections.abc import Collection, Iterator, Mapping
 from itertools import chain
 
 from replay.sources.chunks import ChunkCache
-from replay.sources.mcap.chunk import BadPart, chunk_content, cut_chunk_content
+from replay.sources.mcap.chunk import chunk_content, cut_chunk_content
 from replay.sources.mcap.index import NO_CHUNK, Entry
 from replay.sources.mcap.record_file import RecordFile
-from replay.sources.mcap.records import CHUNK, message_data, message_header_at
+from replay.sources.mcap.records import CHUNK, BadPart, message_data, message_header_at
 
 
 class IndexLiesError(Exception):

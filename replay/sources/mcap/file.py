@@ -15,12 +15,12 @@ from replay.sources.boundary import TEXT_MODE, Closing, translated
 from replay.sources.lapses import lapse_of
 from replay.sources.losses import Loss, Losses
 from replay.sources.mcap.channels import Channel
-from replay.sources.mcap.chunk import BadPart
 from replay.sources.mcap.chunk_reader import ChunkReader, IndexLiesError
 from replay.sources.mcap.index import NO_CHUNK, Entry, indexed_entries
-from replay.sources.mcap.record_file import RecordFile, written_bytes
-from replay.sources.mcap.records import MAGIC, foreign_errors
-from replay.sources.mcap.scan import Scan, chunk_loss, indexed_counts, scan, unknown_types
+from replay.sources.mcap.losses import chunk_loss, unknown_types
+from replay.sources.mcap.record_file import RecordFile, indexed_counts, written_bytes
+from replay.sources.mcap.records import MAGIC, BadPart, foreign_errors
+from replay.sources.mcap.scan import Scan, scan
 from replay.sources.mcap.summary import Contents, read_summary
 from replay.sources.memory import MOST_BYTES, TooLargeError
 from replay.sources.topics import ENCODINGS, topic_table

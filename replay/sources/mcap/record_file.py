@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -145,3 +146,17 @@ def file_crc(file: RecordFile, start: int, stop: int) -> int:
         crc = zlib.crc32(block, crc)
         start += len(block)
     return crc
+
+
+def indexed_counts(file: RecordFile, start: int) -> Counter[int] | None:
+    """Return how many messages of each channel a chunk has, as the indexes say that follow it; None if none do."""
+    return indexes_behind(file, start)[0] or None
+
+
+def indexes_behind(file: RecordFile, start: int) -> tuple[Counter[int], int]:
+    """Return how many messages of each channel the message indexes from a byte on list, and where these end."""
+    counts: Counter[int] = Counter()
+    while (index := file.message_index(start)) is not None:
+        counts[index.channel] += index.count
+        start = index.end
+    return counts, start

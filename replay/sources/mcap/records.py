@@ -7,6 +7,7 @@ import struct
 from io import BytesIO
 from typing import TYPE_CHECKING, NamedTuple
 
+from replay.skip_cause import SkipCause
 from replay.sources.boundary import COMMON
 
 if TYPE_CHECKING:
@@ -19,6 +20,15 @@ ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFS
 
 RECORD = struct.Struct("<BQ")
 MESSAGE_HEAD = struct.Struct("<HIQQ")
+
+
+class BadPart(Exception):
+    """A part of a file cannot be used."""
+
+    def __init__(self, cause: SkipCause, detail: str) -> None:
+        super().__init__(detail)
+        self.cause = cause
+        self.detail = detail
 
 
 @functools.cache

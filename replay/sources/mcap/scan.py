@@ -1,9 +1,5 @@
 """One pass through an MCAP file, one chunk in memory at a time: what is there, and what cannot be used.
 
-A chunk that cannot be used costs the messages in it, a damaged record those up to the next sound one, and the end of a
-file that was cut off what would have come after it. Each is named. Where a sound summary counts just as many messages
-as were found, nothing is lost, whatever else is damaged.
-
 Messages outside of chunks, and those in chunks without a checksum, are covered by the checksum of the data section
 alone, if it has one. Where that is wrong, nothing tells which of them are right: none of them is used.
 """
@@ -16,40 +12,30 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 from replay.skip_cause import SkipCause
-from replay.sources.boundary import COPY_AGAIN
-from replay.sources.lapses import AT_END, Place, Written, lapse_of
+from replay.sources.lapses import Written, lapse_of
 from replay.sources.losses import Loss
 from replay.sources.mcap.channels import Channel, ChannelTable, check_description
-from replay.sources.mcap.chunk import (
-    BadPart,
-    Inside,
-    chunk_content,
-    cut_chunk_content,
-    describes,
-    inner_records,
-    inside_of,
-)
+from replay.sources.mcap.chunk import chunk_content, cut_chunk_content, describes, inner_records, inside_of
+from replay.sources.mcap.chunk_ends import ChunkEnds
 from replay.sources.mcap.index import NO_CHUNK, Entry
-from replay.sources.mcap.record_file import RecordFile, file_crc
+from replay.sources.mcap.losses import Unusable, damaged
+from replay.sources.mcap.record_file import RecordFile, file_crc, indexed_counts
 from replay.sources.mcap.records import (
     CHANNEL,
     CHUNK,
-    HEADER,
-    MAGIC,
     MESSAGE,
     SCHEMA,
+    BadPart,
     MessageHeader,
     Record,
     message_header,
     message_header_at,
 )
-from replay.sources.mcap.summary import Contents, Summary, statistics_between
+from replay.sources.mcap.summary import Contents, Summary
 from replay.sources.mcap.walk import Walk
 from replay.sources.memory import over_memory
-from replay.words import counted
 
 _CRC = struct.Struct("<I")
-_MOST_NAMED = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,15 +131,9 @@ class _Found:
         self._is_wanted: dict[int, bool] = {}
         # those that a checksum of their own covers, and the others
         self._covered, self._others = _Messages(), _Messages()
-        self._bad_chunks: list[tuple[int, BadPart, Counter[int] | None]] = []
-        self._losses: list[Loss] = []
-        # messages that are left out though they may be right
-        self._doubtful: list[Place] = []
+        self._unusable = Unusable(file, summary)
         self._only_covered = False
-        # of chunks without a checksum: whether any has indexes; of those that have not all of theirs, where the last
-        # record in them begins, and where in the file those end that there are
-        self._has_indexes = False
-        self._without_index: dict[int, tuple[int, int]] = {}
+        self._chunk_ends = ChunkEnds(file)
 
     def describe(self, record: Record, *, is_repeated: bool) -> None:
         """Take in a schema or channel outside of chunks; behind the data they are only repeated."""
@@ -163,7 +143,8 @@ class _Found:
             table.add(record.opcode, self._file.content(record))
         except ValueError as error:
             if not is_repeated:
-                self._losses.append(_damaged(record.start, record.end, f"it does not describe a channel: {error}"))
+                detail = f"it does not describe a channel: {error}"
+                self._unusable.named.append(damaged(record.start, record.end, detail))
 
     def add_chunk(self, record: Record, *, is_followed: bool) -> bool:
         """Take in a chunk, all of it or nothing; return whether it surely ends where it says.
@@ -178,35 +159,24 @@ class _Found:
             certain = content if inside is None or is_sure else content[: inside.last_record]
             self._add_content(certain, record.start, self._covered if is_covered else self._others)
         except BadPart as error:
-            self._bad_chunks.append((record.start, error, indexed_counts(self._file, record.end)))
+            self._unusable.bad_chunks.append((record.start, error, indexed_counts(self._file, record.end)))
             return is_followed
         if len(certain) < len(content):
-            self._doubtful.append((record.start, len(certain)))
+            self._unusable.doubtful.append((record.start, len(certain)))
         elif inside is not None:
-            self._look_for_indexes(record, inside)
+            self._chunk_ends.add(record, inside)
         return is_sure
 
-    def _look_for_indexes(self, record: Record, inside: Inside) -> None:
-        """Note a chunk that has not all message indexes behind it.
-
-        If as many bytes of it are missing as an index has, that is in it, and the next record follows all the same.
-        """
-        indexed, end = indexes_behind(self._file, record.end)
-        self._has_indexes |= bool(indexed)
-        if indexed.keys() < inside.channels:
-            self._without_index[record.start] = inside.last_record, end
-
     def _drop_doubtful(self, walk: Walk) -> None:
-        """Leave out the last message of chunks that have not all indexes though there are some."""
-        ends = {walk.ends_early, self._file.size, self._file.written}
-        doubtful = {block: inner for block, (inner, end) in self._without_index.items() if end not in ends}
-        if not self._has_indexes:
+        """Leave out the last messages of chunks of which bytes may be missing."""
+        doubtful = self._chunk_ends.doubtful(walk)
+        if not doubtful:
             return
         for block, inner in doubtful.items():
             header = message_header_at(chunk_content(self._file, block)[0], inner)
             if header is not None:
                 self._others.counts[header.channel] -= 1
-                self._doubtful.append((block, inner))
+                self._unusable.doubtful.append((block, inner))
         left = [each for each in self._others.entries if doubtful.get(each.block) != each.inner]
         self._others.entries = left
 
@@ -216,7 +186,7 @@ class _Found:
         if length > self._file.most_bytes:
             detail = over_memory(self._file.most_bytes)
             loss = Loss(SkipCause.OVER_MEMORY, f"the message at byte {record.start}", detail, 1)
-            self._losses.append(replace(loss, lapse=lapse_of([message.log_time_ns])))
+            self._unusable.named.append(replace(loss, lapse=lapse_of([message.log_time_ns])))
             return
         self._add(message, record.start, NO_CHUNK, self._others)
 
@@ -272,10 +242,10 @@ class _Found:
         contents = Contents(channels, counts, *self._times_ns())
         entries = tuple(self._entries(channels))
         # which takes as much memory as the entries
-        needed = entries if self._doubtful or self._bad_chunks or walk.gaps else ()
+        needed = entries if self._unusable.doubtful or self._unusable.bad_chunks or walk.gaps else ()
         written = Written(((entry.block, entry.inner), entry.log_time_ns) for entry in needed)
-        losses = tuple(self._all_losses(walk, contents, written))
-        bad_chunks = frozenset(start for start, _, _ in self._bad_chunks)
+        losses = tuple(self._unusable.losses(walk, contents, written))
+        bad_chunks = frozenset(start for start, _, _ in self._unusable.bad_chunks)
         return Scan(contents, entries, walk.cut_chunk, losses, bad_chunks, self._only_covered, table)
 
     def _entries(self, channels: Mapping[int, Channel]) -> list[Entry]:
@@ -291,7 +261,7 @@ class _Found:
         try:
             self._add_content(cut_chunk_content(self._file, start), start, self._others)
         except BadPart as error:
-            self._bad_chunks.append((start, error, None))
+            self._unusable.bad_chunks.append((start, error, None))
 
     def _check_data(self, walk: Walk) -> None:
         """Let go of what only the checksum of the data section covers, if it is wrong."""
@@ -305,154 +275,10 @@ class _Found:
             "tells which of them are right; copy the recording again from where it was made"
         )
         lost = self._others.counts.total()
-        self._losses.append(Loss(SkipCause.WRONG_CHECKSUM, "the data section", detail, lost))
+        self._unusable.named.append(Loss(SkipCause.WRONG_CHECKSUM, "the data section", detail, lost))
         self._others = _Messages()
         self._only_covered = True
 
     def _times_ns(self) -> tuple[int | None, int | None]:
         times = [times for each in (self._covered, self._others) if (times := each.times_ns)]
         return min((first for first, _ in times), default=None), max((last for _, last in times), default=None)
-
-    def _all_losses(self, walk: Walk, contents: Contents, written: Written) -> list[Loss]:
-        unknown = list(unknown_types(contents))
-        counted_all = self._summary.statistics if self._summary and self._summary.is_checked else None
-        found = {key: count for key, count in contents.counts.items() if count}
-        if counted_all is not None and found == {
-            key: count for key, count in counted_all.channel_message_counts.items() if count
-        }:
-            return unknown
-        losses = [*self._losses]
-        for place in self._doubtful:
-            lapse = written.between(place, (place[0] + 1, NO_CHUNK))
-            losses.append(replace(_doubtful_end(place[0]), lapse=lapse))
-        for start, error, lost in self._bad_chunks:
-            # whatever of a chunk that was cut off is there comes before what is not
-            lapse = AT_END if start == walk.cut_chunk else written.between((start, NO_CHUNK), (start + 1, NO_CHUNK))
-            losses.append(replace(chunk_loss(start, error, lost, contents.channels), lapse=lapse))
-        losses += self._gap_losses(walk, contents, written, sum(each.messages or 0 for each in losses))
-        if walk.ends_early is not None:
-            losses.append(_ends_early(walk.ends_early, self._file))
-        if not losses:
-            losses += _missing(self._said_counts(walk), contents)
-        return [*losses, *self._after_the_end(walk), *unknown]
-
-    def _said_counts(self, walk: Walk) -> Mapping[int, int]:
-        """Return how many messages of each channel the file says that it has; nothing if it does not say."""
-        said = self._summary.statistics if self._summary else None
-        if said is None and walk.data_end is not None and walk.footer is not None:
-            # What comes before the summary may have become shorter or longer, so that it is not where it should be.
-            said = statistics_between(self._file, walk.data_end.end, walk.footer.start)
-        return said.channel_message_counts if said else {}
-
-    def _gap_losses(self, walk: Walk, contents: Contents, written: Written, named: int) -> list[Loss]:
-        """Return what is lost in gaps, beside what was named.
-
-        The indexes that follow a gap are those of the last chunk in it, and there may have been others: what they count
-        is believed if what the summary counts says so, too.
-        """
-        counts = [indexed_counts(self._file, gap.stop) for gap in walk.gaps]
-        totals = [count.total() if count else None for count in counts]
-        said = self._said_counts(walk)
-        short = sum(max(0, count - contents.counts.get(key, 0)) for key, count in said.items())
-        is_all = bool(said) and short <= named + sum(total or 0 for total in totals)
-        losses = []
-        for gap, total in zip(walk.gaps, totals, strict=True):
-            detail = f"what should be a record there, of type {gap.opcode}, is none that can be read"
-            loss = _damaged(gap.start, gap.stop, detail, total if is_all else None)
-            losses.append(replace(loss, lapse=written.between((gap.start, NO_CHUNK), (gap.stop, NO_CHUNK))))
-        return losses
-
-    def _after_the_end(self, walk: Walk) -> list[Loss]:
-        """Return what is lost if files were put together end to end."""
-        if walk.footer is None:
-            return []
-        end = walk.footer.end + len(MAGIC)
-        self._file.file.seek(end)
-        if self._file.file.read(len(MAGIC) + 1) != MAGIC + bytes([HEADER]):
-            return []
-        loss = _damaged(end, self._file.size, "another recording begins there, after the end of this one: split them")
-        return [replace(loss, lapse=AT_END)]
-
-
-def _doubtful_end(start: int) -> Loss:
-    detail = "it has no checksum, and not what should follow it, so that bytes of its last message may be missing"
-    return Loss(SkipCause.DAMAGED, f"the chunk at byte {start}", detail, 1)
-
-
-def _damaged(start: int, stop: int, detail: str, messages: int | None = None) -> Loss:
-    return Loss(SkipCause.DAMAGED, f"bytes {start} to {stop}", detail, messages)
-
-
-def _ends_early(end: int, file: RecordFile) -> Loss:
-    name = file.path.name
-    # what a run of ours left is the only one
-    remedy = f"finish it with `replay recover {name}`" if name.endswith(".partial") else COPY_AGAIN
-    detail = (
-        f"the last whole record ends there, {counted(file.size - end, 'byte')} before the end of the file, and nothing "
-        f"closes the recording, as when recording or copying was cut off; {remedy}"
-    )
-    return Loss(SkipCause.ENDS_EARLY, f"byte {end}", detail, lapse=AT_END)
-
-
-def indexed_counts(file: RecordFile, start: int) -> Counter[int] | None:
-    """Return how many messages of each channel a chunk has, as the indexes say that follow it; None if none do."""
-    return indexes_behind(file, start)[0] or None
-
-
-def indexes_behind(file: RecordFile, start: int) -> tuple[Counter[int], int]:
-    """Return how many messages of each channel the message indexes from a byte on list, and where these end."""
-    counts: Counter[int] = Counter()
-    while (index := file.message_index(start)) is not None:
-        counts[index.channel] += index.count
-        start = index.end
-    return counts, start
-
-
-def chunk_loss(start: int, error: BadPart, lost: Counter[int] | None, channels: Mapping[int, Channel]) -> Loss:
-    """Return what is lost with a chunk."""
-    place = f"the chunk at byte {start}"
-    if not lost:
-        return Loss(error.cause, place, error.detail)
-    topics: Counter[str] = Counter()
-    for key, count in lost.items():
-        topics[channels[key].topic if key in channels else f"channel {key}"] += count
-    named = ", ".join(f"{count} of {topic}" for topic, count in topics.most_common(_MOST_NAMED))
-    more = " and others" if len(topics) > _MOST_NAMED else ""
-    return Loss(
-        error.cause,
-        place,
-        f"{error.detail}; in it are {named}{more}",
-        lost.total(),
-        next(iter(topics)) if len(topics) == 1 and lost.keys() <= channels.keys() else "",
-        tuple(topics) if lost.keys() <= channels.keys() else (),
-    )
-
-
-def unknown_types(contents: Contents) -> list[Loss]:
-    """Return which messages are there and cannot be used, because of what is known of their channels."""
-    losses = []
-    for key, count in sorted(contents.counts.items()):
-        channel = contents.channels.get(key)
-        if not count:
-            continue
-        if channel is None:
-            losses.append(
-                Loss(SkipCause.UNKNOWN_TYPE, f"channel {key}", "no record of the file describes this channel", count)
-            )
-        elif channel.problem:
-            losses.append(Loss(SkipCause.UNKNOWN_TYPE, f"topic {channel.topic}", channel.problem, count, channel.topic))
-    return losses
-
-
-def _missing(counts: Mapping[int, int], contents: Contents) -> list[Loss]:
-    """Return of which channels there are fewer messages than the summary counts."""
-    losses = []
-    for key, count in sorted(counts.items()):
-        short = count - contents.counts.get(key, 0)
-        topic = contents.channels[key].topic if key in contents.channels else ""
-        if short > 0:
-            # named, as two channels of which nothing else is known would be taken for one
-            whose = "" if topic else f" of channel {key}"
-            detail = f"the summary counts {counted(count, 'message')}{whose}, and {count - short} are there"
-            losses.append(Loss(SkipCause.DAMAGED, "the data section", detail, short, topic))
-    return losses

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from replay.sources.mcap.channels import NO_SCHEMA, Channel, ChannelTable, check_description
-from replay.sources.mcap.chunk import BadPart, inner_records
+from replay.sources.mcap.chunk import inner_records
 from replay.sources.mcap.record_file import RecordFile, file_crc
 from replay.sources.mcap.records import (
     CHANNEL,
@@ -24,6 +24,7 @@ from replay.sources.mcap.records import (
     RECORD,
     SCHEMA,
     STATISTICS,
+    BadPart,
     foreign_errors,
     parser_stream,
 )

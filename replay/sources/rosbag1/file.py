@@ -10,7 +10,7 @@ from pathlib import Path
 from replay.errors import InputError
 from replay.plain_text import brief
 from replay.skip_cause import SkipCause
-from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE, RawMessage, SourceInfo
+from replay.sources.base import DECODED_TYPES, RawMessage, SourceInfo
 from replay.sources.boundary import COMMON, COPY_AGAIN, TEXT_MODE, Closing, translated
 from replay.sources.chunks import ChunkCache
 from replay.sources.definitions.difference import differing_field
@@ -18,16 +18,16 @@ from replay.sources.lapses import AT_END, lapse_of
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import MOST_BYTES
 from replay.sources.rosbag1.chunks import Chunk, read_chunk, records_in
+from replay.sources.rosbag1.contents import BagFile, Contents, Entry
 from replay.sources.rosbag1.index import Index, UnusableIndexError, read_index
 from replay.sources.rosbag1.records import BAG_HEADER, CONNECTION, MESSAGE, Record, record_in, record_of
-from replay.sources.rosbag1.scan import BagFile, Contents, Entry, Scan
+from replay.sources.rosbag1.scan import Scan
 from replay.sources.topics import topic_table
 
 _MAGIC = b"#ROSBAG V"
 _MAGIC_BEFORE_2_0 = b"#ROSRECORD V"
 _MAGIC_2_0 = b"#ROSBAG V2.0\n"
 _UNFINISHED = "it has no index, because its recording was not ended properly"
-_DECODED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 # So many CR bytes, each followed by LF by chance once in 256, come without a single CR LF in 2 of 100 files.
 _TELLING_CR_COUNT = 1000
 
@@ -159,7 +159,7 @@ class Rosbag1File(Closing):
         """Return the connections whose messages are not of the standard type, with what they are listed as."""
         found, counts = {}, self._contents.counts()
         for key, each in self._contents.topics.items():
-            difference = differing_field(each.msgtype, each.definition, 1) if each.msgtype in _DECODED_TYPES else None
+            difference = differing_field(each.msgtype, each.definition, 1) if each.msgtype in DECODED_TYPES else None
             if difference is not None:
                 found[key] = f"{each.msgtype} (another definition)"
                 loss = Loss(SkipCause.UNKNOWN_TYPE, f"topic {each.name}", difference, counts.get(key, 0), each.name)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from replay.sources.boundary import COMMON, OF_LIBRARIES
 from replay.sources.rosbag1.chunks import ChunkPlace
-from replay.sources.rosbag1.records import CHUNK, CHUNK_INFO, CONNECTION, Record, index_rows, record_of
-from replay.sources.rosbag1.scan import BagFile, Entry, Topic, index_section
+from replay.sources.rosbag1.contents import BagFile, Entry, Topic
+from replay.sources.rosbag1.records import CHUNK, CHUNK_INFO, CONNECTION, Record, index_rows, index_section, record_of
 
 if TYPE_CHECKING:
     from replay.sources.rosbag1.lean import LeanReader

@@ -155,6 +155,13 @@ def find_of(file: BinaryIO, start: int, ops: Collection[int]) -> int | None:
         base += len(block) - len(overlap)
 
 
+def index_section(file: BinaryIO, start: int) -> Iterator[Record]:
+    """Yield the records of the index at the end of a bag; none for ``start`` 0."""
+    while start and (record := record_of(file, start)) is not None and record.op in {CONNECTION, CHUNK_INFO}:
+        yield record
+        start = record.end
+
+
 def _header_length(head: bytes) -> int | None:
     if len(head) < _U32.size:
         return None

@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from array import array
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from typing import BinaryIO, NamedTuple, Protocol
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 
 from replay.skip_cause import SkipCause
-from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE
+from replay.sources.base import DECODED_TYPES
 from replay.sources.lapses import Place, Written
 from replay.sources.losses import Loss, Losses
-from replay.sources.rosbag1.chunks import ChunkPlace, Problem, read_chunk, records_in
+from replay.sources.rosbag1.chunk_places import SURE_OUTER, chunk_place, is_unfinished_at
+from replay.sources.rosbag1.chunks import ChunkPlace, read_chunk, records_in
+from replay.sources.rosbag1.contents import BagFile, Entry, Topic, normalised_topic
+from replay.sources.rosbag1.open_chunk import OpenChunk
 from replay.sources.rosbag1.records import (
     CHUNK,
     CHUNK_INFO,
@@ -27,70 +29,12 @@ from replay.sources.rosbag1.records import (
     fields_of,
     find_of,
     index_rows,
-    is_unfinished,
+    index_section,
     record_of,
 )
 from replay.sources.topics import normalised_type
 
-_OUTER = (INDEX, CHUNK, CHUNK_INFO, CONNECTION)
-# Kinds that are never within a chunk.
-_SURE_OUTER = (INDEX, CHUNK, CHUNK_INFO)
-_USED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 _MOST_DEFINITION_BYTES = 1 << 24
-
-
-class Entry(NamedTuple):
-    """Where a message is; sorts by time, then as written."""
-
-    log_time_ns: int
-    chunk: int
-    inner: int
-    connection: int
-
-
-@dataclass(frozen=True, slots=True)
-class BagFile:
-    """An open bag, where its first record is, and where its index should be; 0 if that is not known."""
-
-    file: BinaryIO
-    size: int
-    start: int
-    index_pos: int
-
-
-@dataclass(frozen=True, slots=True)
-class Topic:
-    """What a connection says of its messages; ``definition`` is the text of their type."""
-
-    name: str
-    msgtype: str
-    definition: str
-
-
-class Contents(Protocol):
-    """What is known of a bag, by its index or by a pass through it."""
-
-    @property
-    def topics(self) -> Mapping[int, Topic]:
-        """Connections by id."""
-
-    @property
-    def chunks(self) -> Mapping[int, ChunkPlace]:
-        """Chunks by their byte in the file."""
-
-    def counts(self) -> Mapping[int, int]:
-        """Return how many messages each connection has."""
-
-    def times_ns(self) -> tuple[int, int] | None:
-        """Return the times of the first and last message; None if there is none."""
-
-    def entries(self, connections: Collection[int]) -> list[Entry]:
-        """Return where the messages of these connections are, sorted."""
-
-
-def normalised_topic(name: str) -> str:
-    """Return a topic's name without the slashes that say nothing."""
-    return f"{'/' * name.startswith('/')}{'/'.join(part for part in name.split('/') if part)}"
 
 
 class Scan:
@@ -132,7 +76,7 @@ class Scan:
         self._counts: Counter[int] = Counter()
         self._times_ns: dict[int, tuple[int, int]] = {}
         self._contradictory: set[int] = set()
-        self._open: _OpenChunk | None = None
+        self._open: OpenChunk | None = None
         self._listed_chunks: set[int] = set()
         self._pass(file.start)
         self._finish_chunk()
@@ -189,8 +133,8 @@ class Scan:
 
     def _after_damage(self, start: int, record: Record | None) -> int | None:
         """Return where the pass goes on after what is no record, or none that ends in the file; None if it is over."""
-        following = find_of(self._file, start + 1, _SURE_OUTER)
-        is_cut = self._is_unfinished(start) if record is None else record.end > self._size
+        following = find_of(self._file, start + 1, SURE_OUTER)
+        is_cut = is_unfinished_at(self._file, self._size, start) if record is None else record.end > self._size
         # Bytes that were reserved for a recording and never written are zero.
         if following is None and (is_cut or not any(self._bytes(start, 64))):
             self.is_cut = True
@@ -202,9 +146,6 @@ class Scan:
             stop = self._size if following is None else following
             self._lost.append((Loss(SkipCause.DAMAGED, f"byte {start}", detail), (start, 0), (stop, 0)))
         return following
-
-    def _is_unfinished(self, start: int) -> bool:
-        return self._size - start < 1 << 17 and is_unfinished(self._bytes(start, 1 << 17))
 
     def _bytes(self, start: int, length: int) -> bytes:
         self._file.seek(start)
@@ -233,11 +174,11 @@ class Scan:
     def _take_chunk(self, record: Record) -> int:
         """Take the messages of a chunk; return where the pass goes on."""
         self._finish_chunk()
-        place = self._place(record)
+        place = chunk_place(self._file, self._size, record)
         self.chunks[place.start] = place
         self.is_cut = self.is_cut or (place.is_cut and place.end == self._size)
         chunk = read_chunk(self._file, place, self._most_bytes)
-        found = self._open = _OpenChunk(place, chunk.problem)
+        found = self._open = OpenChunk(place, chunk.problem)
         for each in records_in(chunk.records, place):
             if each is None:
                 found.gaps.append(len(found.entries))
@@ -246,29 +187,6 @@ class Scan:
             else:
                 self._connect(each, chunk.records[each.data : each.end])
         return place.end
-
-    def _place(self, record: Record) -> ChunkPlace:
-        """Return where a chunk is, whatever its header says of its length."""
-        size: int | None = record.number(b"size")
-        compression = record.fields[b"compression"].decode("utf-8", "replace")
-        begin = (record.start, record.data)
-        # Recorders fill in both lengths when the chunk is whole.
-        if size == 0 and record.end == record.data:
-            end = find_of(self._file, record.data, _SURE_OUTER)
-            return ChunkPlace(*begin, end or self._size, compression, None, is_cut=True)
-        if record.end <= self._size and self._is_followed(record.end):
-            return ChunkPlace(*begin, record.end, compression, size)
-        end = find_of(self._file, record.data, _SURE_OUTER)
-        if end is None and record.end > self._size:
-            return ChunkPlace(*begin, self._size, compression, size, is_cut=True)
-        if end is None or end > record.end:
-            return ChunkPlace(*begin, record.end, compression, size, has_sure_end=False)
-        return ChunkPlace(*begin, end, compression, size)
-
-    def _is_followed(self, end: int) -> bool:
-        """Tell whether a record that may follow a chunk, or the end of the file, is at a byte."""
-        record = record_of(self._file, end)
-        return (record is not None and record.op in _OUTER) or self._is_unfinished(end)
 
     def _finish_chunk(self) -> None:
         """Keep what was found in a chunk, once all that its index says of it is known."""
@@ -289,7 +207,7 @@ class Scan:
         self._counts[key] += 1
         topic = self.topics.get(key)
         # of a connection that is not known yet, it may be
-        if topic is None or topic.msgtype in _USED_TYPES or key in self._kept:
+        if topic is None or topic.msgtype in DECODED_TYPES or key in self._kept:
             self._found.setdefault(key, array("Q")).extend(entry[:3])
 
     def _name_losses(self) -> None:
@@ -323,62 +241,3 @@ class Scan:
             self._losses.add(Loss(SkipCause.DAMAGED, f"connection {key}", detail, count))
         for key in self._contradictory:
             del self.topics[key]
-
-
-@dataclass(slots=True)
-class _OpenChunk:
-    """What was found in a chunk, and what its index says."""
-
-    place: ChunkPlace
-    problem: Problem | None
-    entries: list[Entry] = field(default_factory=list)
-    gaps: list[int] = field(default_factory=list)
-    _contradicted: int = 0
-    _indexed: Counter[int] = field(default_factory=Counter)
-    _times_ns: dict[tuple[int, int], int] = field(default_factory=dict)
-
-    def take_index(self, connection: int, rows: Collection[tuple[int, int]]) -> None:
-        """Take in an index record of this chunk."""
-        self._indexed[connection] += len(rows)
-        for time_ns, inner in rows:
-            self._times_ns[connection, inner] = time_ns
-
-    def finished(self) -> Loss | None:
-        """Leave out messages whose time the index contradicts; return what is lost of the chunk."""
-        found = len(self.entries)
-        self.entries = [each for each in self.entries if not self._is_contradicted(each)]
-        contradicted = self._contradicted = found - len(self.entries)
-        lost = max(self._indexed.total() - len(self.entries), contradicted)
-        if self.problem is not None:
-            messages = lost if self._indexed else None
-            return Loss(self.problem.cause, self.place.name, self.problem.detail, messages)
-        if lost:
-            detail = f"its index lists {self._indexed.total()} messages, {len(self.entries)} can be told apart"
-            if contradicted:
-                detail = f"its index says another time than {contradicted} of its messages"
-            return Loss(SkipCause.DAMAGED, self.place.name, detail, lost)
-        if self.gaps:
-            return Loss(SkipCause.DAMAGED, self.place.name, "not all of it can be told apart as messages")
-        return None
-
-    def lost_between(self) -> tuple[Place, Place]:
-        """Return from where until before where messages of it are lost."""
-        start, stop = (self.place.start, 0), (self.place.start + 1, 0)
-        if self._contradicted or not (self.gaps or self.problem):
-            return start, stop
-        sound = min([*self.gaps, len(self.entries)])
-        if sound:
-            start = self.place.start, self.entries[sound - 1].inner + 1
-        if self.problem is None and self.gaps[-1] < len(self.entries):
-            stop = self.place.start, self.entries[self.gaps[-1]].inner
-        return start, stop
-
-    def _is_contradicted(self, entry: Entry) -> bool:
-        return self._times_ns.get((entry.connection, entry.inner), entry.log_time_ns) != entry.log_time_ns
-
-
-def index_section(file: BinaryIO, start: int) -> Iterator[Record]:
-    """Yield the records of the index at the end of a bag; none for ``start`` 0."""
-    while start and (record := record_of(file, start)) is not None and record.op in {CONNECTION, CHUNK_INFO}:
-        yield record
-        start = record.end

@@ -13,9 +13,9 @@ from pathlib import Path
 from replay.skip_cause import SkipCause
 from replay.sources.lapses import AT_END, Lapse
 from replay.sources.losses import Loss, Losses
+from replay.sources.sqlite3.header import read_header
 from replay.sources.sqlite3.journal import read_journal
 from replay.sources.sqlite3.log import PageLog
-from replay.sources.sqlite3.salvage import read_header
 from replay.sources.sqlite3.wal import read_wal
 from replay.sources.temporary import temporary_folder
 

@@ -16,21 +16,22 @@ from pathlib import Path
 
 from replay.errors import InputError
 from replay.skip_cause import SkipCause
-from replay.sources.base import GRID_TYPE, TF_TYPES, UPDATE_TYPE, RawMessage, SourceInfo
+from replay.sources.base import DECODED_TYPES, RawMessage, SourceInfo
 from replay.sources.boundary import COMMON, Closing, translated
 from replay.sources.definitions.difference import differing_field
 from replay.sources.lapses import Lapse, lapse_of
 from replay.sources.losses import Loss, Losses
 from replay.sources.memory import MOST_BYTES, TooLargeError
 from replay.sources.sqlite3.beside import beside, plain_file
-from replay.sources.sqlite3.rows import BadRowError, BagTables, NoBagError, Record, Row, SqliteTables, salvaged_tables
-from replay.sources.sqlite3.salvage import read_header
+from replay.sources.sqlite3.header import read_header
+from replay.sources.sqlite3.salvaged_tables import salvaged_tables
+from replay.sources.sqlite3.sqlite_tables import SqliteTables
+from replay.sources.sqlite3.tables import BadRowError, BagTables, NoBagError, Record, Row
 from replay.sources.topics import normalised_type, topic_table, type_in
 from replay.sources.zstd import ZstdError, decompressed_cdr
 
 _MAGIC = b"SQLite format 3\0"
 _FOREIGN = (*COMMON, sqlite3.Error, ZstdError)
-_DECODED_TYPES = {GRID_TYPE, UPDATE_TYPE, *TF_TYPES}
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,7 +227,7 @@ def _topic(row: Record, count: int, definitions: Sequence[Record]) -> _Topic:
     if "/" not in plain:
         problem = f"its type is {row.get('type')!r}, which is the name of none"
         return _Topic(name, msgtype, encoding, count, problem)
-    if plain not in _DECODED_TYPES:
+    if plain not in DECODED_TYPES:
         return _Topic(name, msgtype, encoding, count)
     if encoding != "cdr":
         return _Topic(name, msgtype, encoding, count, f"it {_not_read(encoding)}")

@@ -1,4 +1,4 @@
-"""Rows of SQLite files that SQLite refuses, or of which it would return wrong ones: read from the pages themselves.
+"""The pages of SQLite files that SQLite refuses, or of which it would return wrong rows.
 
 SQLite has no checksums, and takes whatever page a damaged one points to for the one that it needs. So a row counts here
 only if all of it is there: its page is sound in itself, its record has the length that its parts add up to, and its
@@ -7,82 +7,21 @@ overflow pages are all in the file, are no other row's, and end where the row do
 
 from __future__ import annotations
 
-import functools
-import itertools
-import re
-import sqlite3
 import struct
 from array import array
 from bisect import bisect, insort
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
+from replay.sources.sqlite3.header import HEADER_BYTES, Header
+from replay.sources.sqlite3.page import LEAF, Cell, cells_of, children_of
 from replay.sources.sqlite3.places import Places
+from replay.sources.sqlite3.record import BadPageError, Value, record_of
+from replay.sources.sqlite3.schema import Table, columns_of
 
-_LEAF, _INTERIOR = 0x0D, 0x05
-_HEADER_BYTES = 100
-_LARGEST_KEY = (1 << 63) - 1
-_INTEGER_SIZES = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8}
 _DEEPEST = 20
-# enough for the numbers that a row begins with
-_HEAD_BYTES = 64
-_CREATE = re.compile(r"CREATE TABLE [^()]*\(", re.IGNORECASE)
 _TREE = -1
-
-Value = int | float | str | bytes | None
-
-
-class BadPageError(Exception):
-    """A page, or a row of it, is not what it should be."""
-
-
-class Header(NamedTuple):
-    """What a file says of its pages; ``pages`` is None where that is not up to date."""
-
-    page_bytes: int
-    usable_bytes: int
-    pages: int | None
-
-
-def read_header(file: BinaryIO) -> Header | None:
-    """Return what the header of a SQLite file says; None if it cannot be right."""
-    file.seek(0)
-    head = file.read(_HEADER_BYTES)
-    if len(head) < _HEADER_BYTES:
-        return None
-    # The header stores 65536 as 1, and says at which change its count of pages was right.
-    stored, reserved = struct.unpack_from(">H", head, 16)[0], head[20]
-    changed, pages = struct.unpack_from(">II", head, 24)
-    (valid_for,) = struct.unpack_from(">I", head, 92)
-    page_bytes = 65536 if stored == 1 else stored
-    if page_bytes < 512 or page_bytes & (page_bytes - 1) or page_bytes - reserved < 480:
-        return None
-    return Header(page_bytes, page_bytes - reserved, pages if changed == valid_for and pages else None)
-
-
-class Cell(NamedTuple):
-    """Where a row is.
-
-    Parameters
-    ----------
-    size
-        Length of its record.
-    start, local_bytes
-        Where in the file its record begins, and how much of it is there.
-    overflow
-        The page with what follows; 0 if nothing does.
-    head
-        How its record begins.
-    """
-
-    key: int
-    size: int
-    start: int
-    local_bytes: int
-    overflow: int
-    head: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,14 +31,6 @@ class Gap:
     page: int
     low: int
     high: int | None
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """A table: its first page, and the names of its columns; that of the key is None in each record."""
-
-    root: int
-    columns: tuple[str, ...]
 
 
 @dataclass(slots=True)
@@ -151,7 +82,7 @@ class Pages:
         tables = {}
         for _, record in self.records(leaves):
             if len(record) == 5 and record[0] == "table" and isinstance(record[3], int):
-                tables[str(record[1])] = Table(record[3], _columns(str(record[4])))
+                tables[str(record[1])] = Table(record[3], columns_of(str(record[4])))
         return tables
 
     def leaves(self, root: int, is_row: Callable[[Cell], bool] | None = None) -> Leaves:
@@ -173,7 +104,7 @@ class Pages:
         """Yield the rows of a table that are there, those of a page at once."""
         for number in leaves.pages:
             start = self._start(number, is_sure=False)
-            yield from self._leaf(self._page(start), start, _HEADER_BYTES if number == 1 else 0, 0, None)
+            yield from self._leaf(self._page(start), start, HEADER_BYTES if number == 1 else 0, 0, None)
 
     def records(self, leaves: Leaves) -> Iterator[tuple[int, list[Value]]]:
         """Yield key and values of the rows of a table, in order of key; those that are not whole are left out."""
@@ -263,12 +194,12 @@ class Pages:
             page = self._page(page_start)
             if not depth or self._owners[place]:
                 raise BadPageError(f"page {number} has two places")
-            start = _HEADER_BYTES if number == 1 else 0
-            if page[start] == _LEAF:
+            start = HEADER_BYTES if number == 1 else 0
+            if page[start] == LEAF:
                 cells = self._leaf(page, page_start, start, low, high)
                 children: list[tuple[int, int | None]] = []
             else:
-                cells, children = [], _children(page, start, low, high)
+                cells, children = [], children_of(page, start, low, high)
         except (BadPageError, IndexError, struct.error):
             self.is_broken |= 1 <= number <= self.count
             leaves.gaps.append(Gap(number, low, high))
@@ -282,44 +213,7 @@ class Pages:
             low = key or low
 
     def _leaf(self, page: bytes, place: int, start: int, low: int, high: int | None) -> list[Cell]:
-        """Return the rows of a leaf page that begins at this byte of the file; none unless all of them are sound."""
-        (count,) = struct.unpack_from(">H", page, start + 3)
-        offsets = struct.unpack_from(f">{count}H", page, start + 8)
-        cells, extents = [], []
-        for offset in offsets:
-            cell, end = self._cell(page, place, offset)
-            if not low < cell.key <= (_LARGEST_KEY if high is None else high):
-                raise BadPageError("keys are not in order")
-            low = cell.key
-            cells.append(cell)
-            extents.append((offset, end))
-        extents.sort()
-        ends = [start + 8 + 2 * count, *(end for _, end in extents)]
-        if any(offset < end for (offset, _), end in zip(extents, ends, strict=False)) or ends[-1] > len(page):
-            raise BadPageError("rows overlap")
-        return cells
-
-    def _cell(self, page: bytes, place: int, offset: int) -> tuple[Cell, int]:
-        size, at = varint(page, offset)
-        key, at = varint(page, at)
-        local_bytes = self._local_bytes(size)
-        end = at + local_bytes
-        head = page[at : min(end, at + _HEAD_BYTES)]
-        layout_of(head, size)
-        start = place + at
-        if local_bytes == size:
-            return Cell(key, size, start, local_bytes, 0, head), end
-        (overflow,) = struct.unpack_from(">I", page, end)
-        return Cell(key, size, start, local_bytes, overflow, head), end + 4
-
-    def _local_bytes(self, size: int) -> int:
-        """Return how much of a row of this length is in its own page, as the file format has it."""
-        usable = self._header.usable_bytes
-        most, least = usable - 35, (usable - 12) * 32 // 255 - 23
-        if size <= most:
-            return size
-        fitting = least + (size - least) % (usable - 4)
-        return fitting if fitting <= most else least
+        return cells_of(page, self._header.usable_bytes, place, start, (low, high))
 
     def _find_orphans(self, leaves: Leaves, is_row: Callable[[Cell], bool]) -> None:
         """Take in rows of pages whose parent is lost.
@@ -327,7 +221,7 @@ class Pages:
         An overflow page is never taken for one: it begins with the number of a page, which is less than 2 ** 24 in any
         file of less than 64 GB.
         """
-        if self._places.there >= _LEAF << 24:
+        if self._places.there >= LEAF << 24:
             return
         # first and last key of each page that was found, in order; the rows of no two pages of a table interleave
         taken: list[tuple[int, int]] = []
@@ -337,7 +231,7 @@ class Pages:
                 continue
             try:
                 page = self._page(start)
-                cells = self._leaf(page, start, 0, 0, None) if page[0] == _LEAF else []
+                cells = self._leaf(page, start, 0, 0, None) if page[0] == LEAF else []
             except (BadPageError, IndexError, struct.error):
                 continue
             if cells and all(map(is_row, cells)) and _belong(cells, leaves.gaps, taken):
@@ -353,125 +247,3 @@ def _belong(cells: Sequence[Cell], gaps: Sequence[Gap], taken: Sequence[tuple[in
     place = bisect(taken, (first, first))
     is_apart = (not place or taken[place - 1][1] < first) and (place == len(taken) or last < taken[place][0])
     return within and is_apart
-
-
-def _children(page: bytes, start: int, low: int, high: int | None) -> list[tuple[int, int | None]]:
-    """Return the pages below an interior page, each with the largest key that it may have."""
-    if page[start] != _INTERIOR:
-        raise BadPageError("it is no page of a table")
-    count, _, _, last = struct.unpack_from(">HHBI", page, start + 3)
-    children: list[tuple[int, int | None]] = []
-    for place in struct.unpack_from(f">{count}H", page, start + 12):
-        (child,) = struct.unpack_from(">I", page, place)
-        key, _ = varint(page, place + 4)
-        if not low < key <= (_LARGEST_KEY if high is None else high):
-            raise BadPageError("keys are not in order")
-        children.append((child, key))
-        low = key
-    return [*children, (last, high)]
-
-
-def varint(data: bytes, at: int) -> tuple[int, int]:
-    """Return a number of one to nine bytes, and where what follows it begins."""
-    value = data[at]
-    if value < 0x80:
-        return value, at + 1
-    value = 0
-    for index in range(8):
-        byte = data[at + index]
-        value = value << 7 | byte & 0x7F
-        if byte < 0x80:
-            return value, at + index + 1
-    value = value << 8 | data[at + 8]
-    return (value - (1 << 64) if value >> 63 else value), at + 9
-
-
-class Layout(NamedTuple):
-    """What the header of a record says: the kinds of its values, where each begins, and where the last one ends."""
-
-    kinds: tuple[int, ...]
-    starts: tuple[int, ...]
-
-    def value(self, record: bytes, index: int) -> Value:
-        """Return a value of a record, or of the beginning of one.
-
-        Raises
-        ------
-        BadPageError
-            If there is none, or not all of it is there.
-        """
-        if index >= len(self.kinds) or self.starts[index + 1] > len(record):
-            raise BadPageError("it has too few values")
-        return _value(self.kinds[index], record[self.starts[index] : self.starts[index + 1]])
-
-
-def layout_of(record: bytes, size: int) -> Layout:
-    """Return the layout of a record of this length, of which the beginning is enough.
-
-    Raises
-    ------
-    BadPageError
-        If it has none, or its values do not add up to its length.
-    """
-    end, _ = varint(record, 0)
-    if not 0 < end <= len(record):
-        raise BadPageError("it has no header of a record")
-    layout = _layout(record[:end])
-    if layout.starts[-1] != size:
-        raise BadPageError("its values do not add up to its length")
-    return layout
-
-
-# Most rows of a table begin alike.
-@functools.lru_cache(maxsize=1 << 12)
-def _layout(header: bytes) -> Layout:
-    kinds: list[int] = []
-    _, at = varint(header, 0)
-    try:
-        while at < len(header):
-            kind, at = varint(header, at)
-            kinds.append(kind)
-    except IndexError as error:
-        raise BadPageError("its header ends within a number") from error
-    starts = itertools.accumulate(map(_value_bytes, kinds), initial=len(header))
-    return Layout(tuple(kinds), tuple(starts))
-
-
-def _value_bytes(kind: int) -> int:
-    if kind in {10, 11} or kind < 0:
-        raise BadPageError("it has a value of no kind")
-    if kind >= 12:
-        return (kind - 12) // 2
-    return 8 if kind == 7 else _INTEGER_SIZES.get(kind, 0)
-
-
-def record_of(record: bytes) -> list[Value]:
-    """Return the values of a record."""
-    layout = layout_of(record, len(record))
-    return [layout.value(record, index) for index in range(len(layout.kinds))]
-
-
-def _value(kind: int, content: bytes) -> Value:
-    if kind == 0:
-        return None
-    if kind in {8, 9}:
-        return kind - 8
-    if kind == 7:
-        return float(struct.unpack(">d", content)[0])
-    if kind >= 12:
-        return content.decode("utf-8", "replace") if kind % 2 else content
-    return int.from_bytes(content, "big", signed=True)
-
-
-def _columns(sql: str) -> tuple[str, ...]:
-    """Return the names of a table's columns, as SQLite understands what made it."""
-    if not _CREATE.match(sql) or len(sql) > 1 << 16:
-        return ()
-    with closing(sqlite3.connect(":memory:")) as database:
-        try:
-            database.execute(sql)
-            (name,) = database.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchone()
-            quoted = str(name).replace('"', '""')
-            return tuple(row[1] for row in database.execute(f'PRAGMA table_info("{quoted}")'))
-        except (sqlite3.Error, TypeError):
-            return ()
