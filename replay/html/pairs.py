@@ -40,6 +40,8 @@ class PairShown:
     source: Member
     accepted: bool
     reason: str
+    confidence: str
+    overlap: str
     figures: tuple[Figure, ...]
     searched: str
     picture: Picture | None
@@ -77,15 +79,18 @@ def pairs(story: Story) -> list[PairShown]:
     said = {(item["a"], item["b"]): item for item in story.report["pairs"]}
     ordered = sorted(matches, key=lambda pair: (not matches[pair].accepted, -(matches[pair].confidence or 0.0)))
     found = []
-    for number, pair in enumerate(ordered):
+    pictured = [pair for pair in ordered if matches[pair].target_from_source is not None][:MOST_PAIR_PICTURES]
+    for pair in ordered:
         match, searched = matches[pair], said[pair]["searched"]
-        pose = match.target_from_source if number < MOST_PAIR_PICTURES else None
+        pose = match.target_from_source if pair in pictured else None
         found.append(
             PairShown(
                 story.member(pair[0]),
                 story.member(pair[1]),
                 match.accepted,
                 match.reason.message,
+                percent(match.confidence),
+                area(match.scores.overlap_m2 if match.scores else None),
                 _figures(match),
                 "" if searched is None else _searched(searched["stamp_ns"] - story.first_ns, searched["trigger"]),
                 None if pose is None else _overlay(story, pair, pose, _PAIR_SIDE_PX),

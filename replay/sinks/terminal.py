@@ -7,10 +7,11 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from time import perf_counter
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING
 
 from replay.decisions import decisions
 from replay.events import Event, Merged, Noted, Report, Skipped, Started
+from replay.figures import area, share
 from replay.options import NS_PER_S
 from replay.plain_text import plain
 from replay.skip_cause import SkipCause
@@ -207,9 +208,9 @@ def table_text(report: Report) -> str:
             Text(plain(robot)),
             Text(status, style=_STYLES[status]),
             *_pose(row["merged_from_map"])[: len(pose)],
-            _share(row["acceptance"], 3),
-            _figure(row["overlap_m2"], "{:.1f} m²"),
-            *([_share(row["confidence"], 4)] if known else []),
+            share(row["acceptance"]),
+            area(row["overlap_m2"]),
+            *([share(row["confidence"], 4)] if known else []),
             Text(plain(row["reason"]["message"])),
         )
     console = _console(sys.stdout)
@@ -223,12 +224,3 @@ def _pose(pose: dict[str, float] | None) -> tuple[str, ...]:
         return ("–",) * 4
     turn_deg = math.degrees(pose["yaw_rad"])
     return f"{pose['x_m']:.2f}", f"{pose['y_m']:.2f}", f"{turn_deg:.1f}", f"{pose['scale']:.3f}"
-
-
-def _share(value: float | None, digits: int) -> str:
-    """Return a share rounded down, so that what is less than a limit, or than 1, reads like that."""
-    return "–" if value is None else f"{math.floor(value * 10**digits) / 10**digits:.{digits}f}"
-
-
-def _figure(value: Any, form: str) -> str:  # noqa: ANN401 - a JSON number or null
-    return "–" if value is None else form.format(value)
