@@ -77,7 +77,7 @@ def test_mapmerge_works_where_nothing_else_is_installed() -> None:
     )
 
 
-def test_merging_without_a_rerun_recording_or_a_page_imports_nothing_for_them(tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_what_is_not_written_is_not_imported_for(tmp_path_factory: pytest.TempPathFactory) -> None:
     folder = tmp_path_factory.mktemp("out")
     run = ROOT / "samples" / "two_robots.mcap"
     code = (
