@@ -8,11 +8,11 @@ SITE := .venv-docs
 PINNED := install --quiet --require-hashes --requirement
 PROJECT := install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: demo test check format docs site bench faults picture lock audit clean
+.PHONY: demo test check format docs site bench faults picture reports lock audit clean
 
 demo: $(VENV)/.runtime ## set up and merge a sample recording
 	mkdir -p out
-	$(BIN)/replay merge samples/two_robots.mcap -o out/two_robots.mcap --force
+	$(BIN)/replay merge samples/two_robots.mcap -o out/two_robots.mcap --report out/two_robots.html --force
 
 test: check ## set up, lint, check types and docs, run the tests
 	$(BIN)/python -m pytest
@@ -43,6 +43,9 @@ picture: $(VENV)/.runtime ## take README's picture anew; needs a graphics card o
 	mkdir -p out
 	$(BIN)/replay merge samples/three_robots.bag -o out/three_robots.mcap --force
 	$(BIN)/python scripts/screenshot.py out/three_robots.rrd docs/images/three_robots.png
+
+reports: $(VENV)/.dev ## write docs/reports anew, and its picture; needs REPLAY_DATA, chromium and its driver
+	PYTHONPATH=. $(BIN)/python scripts/reports.py
 
 lock: $(TOOLS)/.installed ## write requirements/ anew after pyproject.toml has changed; UPGRADE=1: the newest versions
 	$(TOOLS)/bin/python scripts/lock.py $(if $(UPGRADE),--upgrade)

@@ -6,30 +6,26 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from mapmerge.rounding import rounded_down
+
 NO_FIGURE = "–"
-_ROUNDING_DIGITS = 9
 
 
 def share(value: float | None, digits: int = 3) -> str:
     """Return a share rounded down, so that what is less than a limit, or than 1, reads like that."""
-    return NO_FIGURE if value is None else f"{down(value, digits):.{digits}f}"
+    return NO_FIGURE if value is None else f"{rounded_down(value, digits):.{digits}f}"
 
 
 def area(value_m2: float | None) -> str:
     """Return an area rounded down, as reasons name it."""
-    return NO_FIGURE if value_m2 is None else f"{down(value_m2, 1):,.1f} m²"
+    return NO_FIGURE if value_m2 is None else f"{rounded_down(value_m2, 1):,.1f} m²"
 
 
 def percent(value: float | None) -> str:
     """Return a probability in percent, rounded down, with as many digits as tell it from 1."""
     if value is None:
         return NO_FIGURE
-    return f"{down(value * 100.0, 2 if value > 0.9 or value < 0.01 else 0):g} %"
-
-
-def down(value: float, digits: int) -> float:
-    """Round down, but not below what the number is but for its last binary digits."""
-    return math.floor(round(value * 10.0**digits, _ROUNDING_DIGITS)) / 10.0**digits
+    return f"{rounded_down(value * 100.0, 2 if value > 0.9 or value < 0.01 else 0):g} %"
 
 
 def degrees(yaw_rad: float, digits: int = 1) -> str:

@@ -41,7 +41,6 @@ def page(story: Story) -> str:
         legend=pairs.legend,
         tint_legend=pictures.TINT_LEGEND,
         refused=pairs.refused(story),
-        most_pair_pictures=pairs.MOST_PAIR_PICTURES,
         course=course.course(story),
         plots=plots.plots(story),
         drawing=(plots.WIDTH, plots.HEIGHT),

@@ -12,12 +12,13 @@ from mapmerge.match.base import Rival
 from mapmerge.match.verdict import lacking
 from mapmerge.outcome import Pair
 from mapmerge.reasons import ReasonCode
+from mapmerge.rounding import rounded_down
 from mapmerge.sim2 import IDENTITY, Sim2
 from mapmerge.verify import Scores
 from mapmerge.warp import Layer
 from mapmerge.watch import Trigger
 from replay.advice import ADVICE
-from replay.figures import area, degrees, down, fixed, percent, seconds, share
+from replay.figures import area, degrees, fixed, percent, seconds, share
 from replay.html.pictures import AGREE, CONTRADICT, Picture, overlay_picture
 from replay.html.roster import Member
 from replay.html.story import Story
@@ -40,6 +41,8 @@ class PairShown:
     source: Member
     accepted: bool
     reason: str
+    confidence: str
+    overlap: str
     figures: tuple[Figure, ...]
     searched: str
     picture: Picture | None
@@ -77,15 +80,18 @@ def pairs(story: Story) -> list[PairShown]:
     said = {(item["a"], item["b"]): item for item in story.report["pairs"]}
     ordered = sorted(matches, key=lambda pair: (not matches[pair].accepted, -(matches[pair].confidence or 0.0)))
     found = []
-    for number, pair in enumerate(ordered):
+    pictured = [pair for pair in ordered if matches[pair].target_from_source is not None][:MOST_PAIR_PICTURES]
+    for pair in ordered:
         match, searched = matches[pair], said[pair]["searched"]
-        pose = match.target_from_source if number < MOST_PAIR_PICTURES else None
+        pose = match.target_from_source if pair in pictured else None
         found.append(
             PairShown(
                 story.member(pair[0]),
                 story.member(pair[1]),
                 match.accepted,
                 match.reason.message,
+                percent(match.confidence),
+                area(match.scores.overlap_m2 if match.scores else None),
                 _figures(match),
                 "" if searched is None else _searched(searched["stamp_ns"] - story.first_ns, searched["trigger"]),
                 None if pose is None else _overlay(story, pair, pose, _PAIR_SIDE_PX),
@@ -155,7 +161,10 @@ def _figures(match: Match) -> tuple[Figure, ...]:
         figures += [
             ("acceptance", share(scores.acceptance)),
             ("overlap", area(scores.overlap_m2)),
-            ("walls that agree", f"{down(scores.wall_agreement * 100, 0):.0f} %, {_metres(scores.matched_wall_m)}"),
+            (
+                "walls that agree",
+                f"{rounded_down(scores.wall_agreement * 100, 0):.0f} %, {_metres(scores.matched_wall_m)}",
+            ),
             ("walls in the other's free space", _metres(scores.violated_wall_m)),
             ("score", f"{scores.score_m:.1f}"),
         ]
@@ -171,7 +180,7 @@ def _rival_figures(rival: Rival) -> tuple[Figure, ...]:
         figures += [
             ("acceptance", share(fit.acceptance)),
             ("overlap", area(fit.overlap_m2)),
-            ("walls that agree", f"{down(fit.wall_agreement * 100, 0):.0f} %, {_metres(fit.matched_wall_m)}"),
+            ("walls that agree", f"{rounded_down(fit.wall_agreement * 100, 0):.0f} %, {_metres(fit.matched_wall_m)}"),
             ("walls that contradict it", _metres(fit.contradicted_m)),
         ]
     return (*figures, ("score", f"{rival.score_m:.1f}"))
@@ -203,7 +212,7 @@ def _times(likelihood: float) -> str:
 
 
 def _metres(length_m: float) -> str:
-    return f"{down(length_m, 1):,.1f} m"
+    return f"{rounded_down(length_m, 1):,.1f} m"
 
 
 def _pose(pose: Sim2) -> str:

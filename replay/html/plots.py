@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mapmerge.match import CALIBRATED
-from replay.figures import down
+from mapmerge.rounding import rounded_down
 from replay.html.axes import Axis, axis
 from replay.html.roster import Member
 from replay.html.series import Sample
@@ -236,4 +236,8 @@ def _rounded(quantity: Quantity, samples: Sequence[Sample]) -> Iterator[float | 
         if value is None:
             yield None
         else:
-            yield down(value, quantity.digits) if quantity.is_rounded_down else round(value, quantity.digits) + 0.0
+            yield (
+                rounded_down(value, quantity.digits)
+                if quantity.is_rounded_down
+                else round(value, quantity.digits) + 0.0
+            )

@@ -19,12 +19,29 @@ from replay.words import counted
 Level = Literal["good", "partly", "bad"]
 
 
+MOST_BY_THEMSELVES = 3
+"""Of so many robots that are not merged, each is told of by itself; of more, those with one reason together."""
+
+
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A robot that is not merged: why, and what may be done."""
+    """Robots that are not merged, for one reason: why, and what may be done.
 
-    member: Member
+    Parameters
+    ----------
+    members
+        The robots.
+    reason
+        The reason in words; that of the first one.
+    is_example
+        Whether others have it in other words.
+    advice
+        What to do.
+    """
+
+    members: tuple[Member, ...]
     reason: str
+    is_example: bool
     advice: str
 
 
@@ -57,19 +74,27 @@ def verdict(story: Story) -> Verdict:
     """Return what there is to say first."""
     robots = story.report["robots"]
     placed = [robot for robot, values in robots.items() if values["merged_from_map"] is not None]
-    refusals = tuple(
-        Refusal(story.member(robot), values["reason"]["message"], ADVICE[ReasonCode(values["reason"]["code"])])
-        for robot, values in robots.items()
-        if values["merged_from_map"] is None
-    )
     merged = [robot for robot in placed if robots[robot]["status"] == Status.MERGED]
     return Verdict(
         _level(len(robots), len(placed), len(merged)),
         _sentence(story, len(placed), len(merged)),
         _sure(story, merged),
-        refusals,
+        tuple(_refusals(story)),
         tuple(_troubles(story)),
     )
+
+
+def _refusals(story: Story) -> Iterator[Refusal]:
+    robots = story.report["robots"]
+    refused = {robot: values["reason"] for robot, values in robots.items() if values["merged_from_map"] is None}
+    together: dict[str, list[str]] = {}
+    for robot, reason in refused.items():
+        together.setdefault(reason["code"] if len(refused) > MOST_BY_THEMSELVES else robot, []).append(robot)
+    for group in together.values():
+        first = refused[group[0]]
+        is_example = any(refused[robot]["message"] != first["message"] for robot in group)
+        members = tuple(story.member(robot) for robot in group)
+        yield Refusal(members, first["message"], is_example, ADVICE[ReasonCode(first["code"])])
 
 
 def _level(robots: int, placed: int, merged: int) -> Level:

@@ -8,10 +8,10 @@ from enum import IntEnum
 from time import perf_counter
 from typing import IO, TYPE_CHECKING
 
-from mapmerge.rounding import rounded_down
 from replay.colours import are_on
 from replay.decisions import decisions
 from replay.events import Event, Merged, Noted, Report, Skipped, Started
+from replay.figures import share
 from replay.options import NS_PER_S
 from replay.plain_text import listed, plain
 from replay.skip_cause import SkipCause
@@ -236,8 +236,3 @@ def open_console(stream: IO[str], colour: str = "auto") -> Console:
         no_color=not on,
         color_system=("auto" if stream.isatty() else "standard") if on else None,
     )
-
-
-def share(value: float | None, digits: int) -> str:
-    """Return a share rounded down, so that what is less than a limit, or than 1, reads like that."""
-    return "–" if value is None else f"{rounded_down(value, digits):.{digits}f}"

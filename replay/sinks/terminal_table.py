@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Sequence
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from mapmerge.rounding import rounded_down
 from replay.events import Report
+from replay.figures import area, degrees, fixed, share
 from replay.plain_text import plain
-from replay.sinks.terminal import open_console, share
+from replay.sinks.terminal import open_console
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -62,7 +61,7 @@ def _table(report: Report, reasons: Sequence[str]) -> Table:
             Text(status, style=_STYLES[status]),
             *_pose(row["merged_from_map"])[: len(pose)],
             share(row["acceptance"], 3),
-            _area(row["overlap_m2"]),
+            area(row["overlap_m2"]),
             share(row["confidence"], 4),
             *([Text(reason)] if reasons else []),
         )
@@ -72,10 +71,4 @@ def _table(report: Report, reasons: Sequence[str]) -> Table:
 def _pose(pose: dict[str, float] | None) -> tuple[str, ...]:
     if pose is None:
         return ("–",) * 4
-    turn_deg = math.degrees(pose["yaw_rad"])
-    return f"{pose['x_m']:.2f}", f"{pose['y_m']:.2f}", f"{turn_deg:.1f}", f"{pose['scale']:.3f}"
-
-
-def _area(value_m2: Any) -> str:  # noqa: ANN401 - a JSON number or null
-    """Return an area rounded down, as the reason says it."""
-    return "–" if value_m2 is None else f"{rounded_down(value_m2, 1):.1f} m²"
+    return fixed(pose["x_m"], 2), fixed(pose["y_m"], 2), degrees(pose["yaw_rad"]), fixed(pose["scale"], 3)

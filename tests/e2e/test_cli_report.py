@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -99,6 +100,29 @@ def test_a_run_that_fails_leaves_no_page(replay: Program, tmp_path: Path) -> Non
     assert names(tmp_path) == ["in"]
 
 
+@pytest.mark.parametrize("name", ["out.mcap", "page.html", "out.json"])
+def test_a_run_that_cannot_give_its_names_leaves_the_page_that_was_there(
+    replay: Program, two: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    older = {tmp_path / "out.mcap", tmp_path / "out.json", tmp_path / "pages" / "page.html"}
+    (tmp_path / "pages").mkdir()
+    for path in older:
+        path.write_text(f"the {path.name} of an earlier run")
+    replace = os.replace
+
+    def refusing(old: str, new: str) -> None:
+        if Path(new).name == name and Path(old).suffix == ".partial":
+            raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+        replace(old, new)
+
+    monkeypatch.setattr(os, "replace", refusing)
+    ran = replay("merge", two, "-o", "out.mcap", "--no-rrd", "--report", "pages/page.html", "--force", *QUIET)
+    assert ran.status == 3
+    assert f"{name}: cannot be written" in ran.err.splitlines()[-1]
+    assert {path for path in tmp_path.rglob("*") if path.is_file()} == older
+    assert {path.read_text() for path in older} == {f"the {path.name} of an earlier run" for path in older}
+
+
 HOSTILE = {
     "markup": "<script>alert(1)</script>",
     "a broken attribute": "r\"><img src=x onerror='alert(1)'>",
@@ -156,8 +180,18 @@ def test_a_topic_is_only_ever_text(replay: Program, tmp_path: Path, name: str) -
         ("samples/three_robots.bag", "--robots", "r2,r1", "--start", "1.5", "--stop", "120"),
         ("alpha=samples/bag_per_robot/alpha", "bravo=samples/bag_per_robot/bravo", "--min-confidence", "0.95"),
         ("samples/two_robots.mcap", "--clock", "log", "--reorder-window", "0.25", "--max-memory", "300MB"),
-        ("samples/two_robots.mcap", "--init-pose", "r2=1,2,30deg+-5,+-5,+-90deg", "--align-starts"),
-        ("samples/two_robots.mcap", "--topic", "/{robot}/map", "--method", "existing", "--scale", "free"),
+        ("samples/two_robots.mcap", "--init-pose", "r2=1,2,30deg+-5,+-5,+-90deg", "--align-starts", "--stop", "40"),
+        (
+            "samples/two_robots.mcap",
+            "--topic",
+            "/{robot}/map",
+            "--method",
+            "existing",
+            "--scale",
+            "free",
+            "--stop",
+            "20",
+        ),
     ],
 )
 def test_the_command_that_it_names_gives_the_same_again(

@@ -51,9 +51,10 @@ def test_merging_reaches_nothing_and_leaves_nothing_but_its_outputs(tmp_path: Pa
     outputs = tmp_path / "outputs"
     outputs.mkdir()
     arguments = ("merge", SAMPLES / "two_robots.mcap", "-o", outputs / "out.mcap", "--images", "changed")
+    arguments = (*arguments, "--report", outputs / "out.html")
     done = forbidden.python(RUN, *arguments, folder=home, sandbox=sandbox)
     assert done.returncode == 0, done.stderr
-    assert {each.name for each in outputs.iterdir()} == {"out.mcap", "out.rrd", "out.json"}
+    assert {each.name for each in outputs.iterdir()} == {"out.mcap", "out.rrd", "out.html", "out.json"}
     assert list(home.rglob("*")) == []
 
 

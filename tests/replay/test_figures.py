@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from replay.figures import area, degrees, down, fixed, init_pose, percent, share, size
+from mapmerge.rounding import rounded_down
+from replay.figures import area, degrees, fixed, init_pose, percent, share, size
 from replay.init_pose import InitPose
 
 
@@ -30,8 +31,8 @@ def test_a_probability_is_rounded_down(value: float, expected: str) -> None:
 
 
 def test_nothing_is_rounded_below_what_it_is() -> None:
-    assert down(0.3 * 3, 1) == 0.9
-    assert down(-0.05, 1) == -0.1
+    assert rounded_down(0.3 * 3, 1) == 0.9
+    assert rounded_down(-0.05, 1) == -0.1
 
 
 def test_no_zero_has_a_sign() -> None:

@@ -36,6 +36,7 @@ from replay.sinks.rerun_stream import RrdStream
 from replay.skip_cause import SkipCause
 from tests.floors import filled
 from tests.runs import bare_room, flat_map, reference_from
+from tests.viewers import require
 
 ROBOTS = ("r1", "r2", "odd one/ü.3", "r4")
 STRANGER = "odd one/ü.3"
@@ -501,8 +502,7 @@ def renderer_missing() -> str | None:
 
 
 def test_the_viewer_shows_it_without_complaint(recording: Path, tmp_path: Path) -> None:
-    if missing := renderer_missing():
-        pytest.skip(missing)
+    require(renderer_missing())
     from scripts.screenshot import complaints, show, show_tab, viewer
 
     shown: set[str] = set()
