@@ -27,7 +27,7 @@ class RobotColour:
 
 
 # Told apart by those who see red and green alike. Green and red say whether maps agree, and grey is kept for limits.
-_PALETTE: tuple[RobotColour, ...] = (
+ROBOT_COLOURS: tuple[RobotColour, ...] = (
     RobotColour("blue", (77, 163, 255), (31, 105, 190)),
     RobotColour("orange", (255, 159, 64), (222, 120, 10)),
     RobotColour("violet", (196, 132, 255), (135, 60, 200)),
@@ -41,7 +41,7 @@ _PALETTE: tuple[RobotColour, ...] = (
 
 def robot_colour(index: int) -> RobotColour:
     """Return the colour of a robot by its place in the run, the reference being 0; they repeat when there are many."""
-    return _PALETTE[index % len(_PALETTE)]
+    return ROBOT_COLOURS[index % len(ROBOT_COLOURS)]
 
 
 def as_hex(colour: Rgb) -> str:

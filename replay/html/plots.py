@@ -236,8 +236,5 @@ def _rounded(quantity: Quantity, samples: Sequence[Sample]) -> Iterator[float | 
         if value is None:
             yield None
         else:
-            yield (
-                rounded_down(value, quantity.digits)
-                if quantity.is_rounded_down
-                else round(value, quantity.digits) + 0.0
-            )
+            digits = quantity.digits
+            yield rounded_down(value, digits) if quantity.is_rounded_down else round(value, digits) + 0.0
