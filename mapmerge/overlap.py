@@ -78,7 +78,10 @@ def overlap(
         return None
     reach = max(1, round(tolerance_m / resolution_m))
     corner = Sim2(box.left * resolution_m, box.top * resolution_m)
-    return Overlap(_compared(warps, box, reach, config), resolution_m, lattice.map_from_grid @ corner)
+    # a wall just outside may be the one that another within is near to
+    around = box.padded(reach)
+    kinds = _compared(warps, around, reach, config)[box.slices(around)]
+    return Overlap(kinds, resolution_m, lattice.map_from_grid @ corner)
 
 
 def _coarser(layer: Layer, resolution_m: float) -> Layer:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mapmerge.overlay import compare, pixels_around, seen, values_on
+import numpy as np
+
+from mapmerge.raster import compared_on, pixels_around, seen, shrunk, values_on
 from mapmerge.sim2 import IDENTITY
 from mapmerge.warp import Layer
 from replay.html.pictures import Picture, grey_picture, mask_picture, single_picture, tint_picture, visible
 from replay.html.roster import Member
-from replay.html.story import Story
+from replay.html.story import MAX_SIDE_PX, Story
 
-MAX_SIDE_PX = 1600
 _OWN_SIDE_PX = 800
 
 
@@ -55,11 +56,11 @@ def merged_stack(story: Story) -> Stack | None:
     if result is None or result.merged is None:
         return None
     placed = [
-        (story.member(robot), Layer(result.grids[robot], outcome.merged_from_map))
+        (story.member(robot), layer)
         for robot, outcome in result.robots.items()
-        if outcome.merged_from_map is not None and robot in result.grids
+        if outcome.merged_from_map is not None and (layer := story.layer(robot, outcome.merged_from_map)) is not None
     ]
-    merged = Layer(result.merged, IDENTITY)
+    merged = Layer(shrunk(result.merged, MAX_SIDE_PX, story.cells), IDENTITY)
     pixels = pixels_around([merged, *(layer for _, layer in placed)], MAX_SIDE_PX)
     if pixels is None:
         return None
@@ -70,7 +71,8 @@ def merged_stack(story: Story) -> Stack | None:
         walls = mask_picture([(visible(shown.walls), member.rgb)], pixels)
         layers.append(MapLayer(member.name, walls, member.colour, shown=True, kind="walls"))
     if len(maps) > 1:
-        tint = tint_picture(compare(maps, pixels.pixel_m, story.tolerance_m), pixels)
+        found = compared_on([layer for _, layer in placed], pixels, story.cells, story.tolerance_m)
+        tint = tint_picture(found, np.logical_or.reduce([shown.walls for shown in maps]), pixels)
         layers.append(MapLayer("where maps overlap", tint, None, shown=False, kind="tint"))
     return Stack(tuple(layers), result.merged.resolution_m)
 
@@ -82,7 +84,7 @@ def apart(story: Story) -> list[Apart]:
         if values["merged_from_map"] is not None:
             continue
         member = story.member(robot)
-        grid = story.result.grids.get(robot) if story.result else None
-        picture = single_picture(Layer(grid, IDENTITY), member.rgb, story.cells, _OWN_SIDE_PX) if grid else None
+        layer = story.layer(robot, IDENTITY)
+        picture = single_picture(layer, member.rgb, story.cells, _OWN_SIDE_PX) if layer else None
         found.append(Apart(member, picture, values["reason"]["message"], values["reason"]["code"]))
     return found

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mapmerge.config import VerifyConfig
+from mapmerge.drawing import AGREE
 from mapmerge.match import Match
 from mapmerge.match.base import Rival
 from mapmerge.match.verdict import lacking
@@ -15,11 +16,10 @@ from mapmerge.reasons import ReasonCode
 from mapmerge.rounding import rounded_down
 from mapmerge.sim2 import IDENTITY, Sim2
 from mapmerge.verify import Scores
-from mapmerge.warp import Layer
 from mapmerge.watch import Trigger
 from replay.advice import ADVICE
 from replay.figures import area, degrees, fixed, percent, seconds, share
-from replay.html.pictures import AGREE, CONTRADICT, Picture, overlay_picture
+from replay.html.pictures import CONTRADICT, Picture, overlay_picture
 from replay.html.roster import Member
 from replay.html.story import Story
 from replay.palette import as_hex
@@ -143,13 +143,11 @@ def _candidates(story: Story, pair: Pair, match: Match, most: int) -> list[Candi
 
 
 def _overlay(story: Story, pair: Pair, pose: Sim2, side_px: int) -> Picture | None:
-    grids = story.result.grids if story.result else {}
-    target, source = (grids.get(robot) for robot in pair)
+    target, source = story.layer(pair[0], IDENTITY), story.layer(pair[1], pose)
     if target is None or source is None:
         return None
     colours = story.member(pair[0]).rgb, story.member(pair[1]).rgb
-    layers = Layer(target, IDENTITY), Layer(source, pose)
-    return overlay_picture(*layers, colours, story.cells, story.tolerance_m, side_px)
+    return overlay_picture(target, source, colours, story.cells, story.tolerance_m, side_px)
 
 
 def _figures(match: Match) -> tuple[Figure, ...]:

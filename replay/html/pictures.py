@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmerge.config import CellConfig
-from mapmerge.grid import MAX_PERCENT
-from mapmerge.overlay import Comparison, Pixels, Seen, compare, pixels_around, seen, values_on
+from mapmerge.drawing import AGREE
+from mapmerge.grid import MAX_PERCENT, Mask
+from mapmerge.raster import Comparison, Pixels, compared_on, pixels_around, seen, values_on
 from mapmerge.warp import Layer
 from replay.palette import Rgb, as_hex
 
 Indices = NDArray[np.uint8]
 
-# Of what is compared: so dark a green, and so clear a red, that no robot's colour is taken for them.
-AGREE: Rgb = (0, 84, 40)
-CONTRADICT: Rgb = (225, 25, 35)
+# What contradicts is as red as in the pictures of the method.
+CONTRADICT: Rgb = (220, 30, 40)
 _NOTHING: Rgb = (255, 255, 255)
 _KNOWN_BY_ONE: Rgb = (238, 240, 243)
 _SHARED: Rgb = (255, 255, 255)
@@ -70,7 +70,7 @@ class Picture:
 TINT_LEGEND = (
     (as_hex(AGREE), "walls that agree"),
     (as_hex(CONTRADICT), "wall in another's free space"),
-    (as_hex(_TINT), "ground that two or more know"),
+    (as_hex(_TINT), "free space that agrees"),
 )
 """What the colours of `tint_picture` mean."""
 
@@ -88,7 +88,7 @@ def grey_picture(values: Indices, pixels: Pixels) -> Picture:
     return Picture(_uri(table[values], [_NOTHING, *(_grey(step) for step in range(_GREYS))]), pixels)
 
 
-def mask_picture(masks: Sequence[tuple[NDArray[np.bool_], Rgb]], pixels: Pixels) -> Picture:
+def mask_picture(masks: Sequence[tuple[Mask, Rgb]], pixels: Pixels) -> Picture:
     """Return where something is, each in its colour, the last on top; elsewhere it is transparent."""
     indices = np.zeros((pixels.rows, pixels.cols), np.uint8)
     for number, (mask, _) in enumerate(masks, start=1):
@@ -96,10 +96,10 @@ def mask_picture(masks: Sequence[tuple[NDArray[np.bool_], Rgb]], pixels: Pixels)
     return Picture(_uri(indices, [_NOTHING, *(colour for _, colour in masks)]), pixels)
 
 
-def tint_picture(found: Comparison, pixels: Pixels) -> Picture:
-    """Return which walls agree, which contradict each other, and a tint where maps share ground."""
-    walls = [(visible(found.agree), AGREE), (visible(found.contradict), CONTRADICT)]
-    return mask_picture([(found.shared, _TINT), *walls], pixels)
+def tint_picture(found: Comparison, walls: Mask, pixels: Pixels) -> Picture:
+    """Return a tint where maps agree, which walls do, and what contradicts."""
+    agreeing, contradicting = visible(walls & found.agree), visible(found.contradict)
+    return mask_picture([(found.agree, _TINT), (agreeing, AGREE), (contradicting, CONTRADICT)], pixels)
 
 
 def single_picture(layer: Layer, colour: Rgb, cells: CellConfig, max_side_px: int) -> Picture | None:
@@ -136,22 +136,18 @@ def overlay_picture(
     pixels = pixels_around([target, source], max_side_px)
     if pixels is None:
         return None
-    maps = [seen(values_on(layer, pixels, cells), cells) for layer in (target, source)]
-    found = compare(maps, pixels.pixel_m, tolerance_m)
+    ours, theirs = (seen(values_on(layer, pixels, cells), cells) for layer in (target, source))
+    found = compared_on([target, source], pixels, cells, tolerance_m)
     indices = np.zeros((pixels.rows, pixels.cols), np.uint8)
-    indices[maps[0].known | maps[1].known] = 1
-    indices[found.shared] = 2
-    for number, mask in enumerate(_walls(maps, found), start=3):
-        indices[mask] = number
+    indices[ours.known | theirs.known] = 1
+    indices[ours.known & theirs.known] = 2
+    masks = ours.walls, theirs.walls, (ours.walls | theirs.walls) & found.agree, found.contradict
+    for number, mask in enumerate(masks, start=3):
+        indices[visible(mask)] = number
     return Picture(_uri(indices, [_NOTHING, _KNOWN_BY_ONE, _SHARED, *colours, AGREE, CONTRADICT]), pixels)
 
 
-def _walls(maps: Sequence[Seen], found: Comparison) -> list[NDArray[np.bool_]]:
-    masks = [maps[0].walls, maps[1].walls, found.agree, found.contradict]
-    return [visible(mask) for mask in masks]
-
-
-def visible(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def visible(mask: Mask) -> Mask:
     """Return walls as wide as two pixels where a picture is so large that it is shown smaller."""
     if max(mask.shape) < _THIN_FROM_PX:
         return mask

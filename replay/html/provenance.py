@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from replay.figures import size
 from replay.html.story import Story
-from replay.options import DEFAULT_REORDER_WINDOW_NS, NS_PER_S, RunOptions
+from replay.options import DEFAULT_REORDER_WINDOW_NS, NS_PER_S, OutputOptions, RunOptions
 from replay.words import moment
 
 _FLAGS_OF_MERGE = {"merge.method", "merge.scale", "merge.verify.min_confidence"}
@@ -66,13 +67,13 @@ class Provenance:
 def provenance(story: Story) -> Provenance:
     """Return what a reader needs to have the same again."""
     report = story.report
-    ours = dict(_flat(RunOptions(()).settings()))
+    ours = dict(_flat(_defaults()))
     settings = tuple(
         Setting(name, _text(value), None if value == ours.get(name) else _text(ours.get(name)))
         for name, value in _flat(story.settings)
     )
     changed = tuple(item for item in settings if item.default is not None)
-    again, why_not = command(story, [item.name for item in changed])
+    again, why_not = command(story, changed)
     return Provenance(
         tuple(_input(item) for item in report["inputs"]),
         changed,
@@ -85,11 +86,19 @@ def provenance(story: Story) -> Provenance:
     )
 
 
-def command(story: Story, changed: list[str]) -> tuple[str | None, str]:
+def _defaults() -> Mapping[str, Any]:
+    return {**RunOptions(()).settings(), "outputs": OutputOptions(Path("out.mcap")).settings("changed")}
+
+
+def command(story: Story, changed: Sequence[Setting]) -> tuple[str | None, str]:
     """Return the command that gives this outcome in the folder of its inputs or, if there is none, why."""
-    if any(name.startswith("merge.") and name not in _FLAGS_OF_MERGE for name in changed):
-        return None, "It was run from Python, with settings that no flag can say: those above that differ."
-    found = shlex.join(["replay", "merge", *_runs(story), *_flags(story)])
+    thresholds = [
+        part
+        for item in changed
+        if item.name.startswith("merge.") and item.name not in _FLAGS_OF_MERGE
+        for part in ("--set", f"{item.name}={item.value}")
+    ]
+    found = shlex.join(["replay", "merge", *_runs(story), *_flags(story), *thresholds])
     if not found.isprintable():
         return None, "A name in it holds characters that cannot be typed."
     return found, ""
@@ -109,7 +118,8 @@ def _runs(story: Story) -> Iterator[str]:
 
 def _flags(story: Story) -> Iterator[str]:
     said = story.settings
-    yield from ("--robots", ",".join(item.robot for item in story.robots))
+    if said["robots"] is not None:
+        yield from ("--robots", ",".join(said["robots"]))
     for choice in said["topics"]:
         yield from ("--topic", f"{choice['robot']}={choice['topic']}" if choice["robot"] else str(choice["topic"]))
     if said["clock"] != "header":
@@ -125,6 +135,7 @@ def _flags(story: Story) -> Iterator[str]:
     if said["max_memory_bytes"] is not None:
         yield from ("--max-memory", f"{said['max_memory_bytes']}")
     yield from _placing_flags(said)
+    yield from _output_flags(said.get("outputs") or _defaults()["outputs"])
 
 
 def _placing_flags(said: Mapping[str, Any]) -> Iterator[str]:
@@ -143,6 +154,15 @@ def _placing_flags(said: Mapping[str, Any]) -> Iterator[str]:
     ):
         if value != default:
             yield from (flag, str(value))
+
+
+def _output_flags(said: Mapping[str, Any]) -> Iterator[str]:
+    if said["images"] != "changed":
+        yield from ("--images", str(said["images"]))
+    if said["every_ns"]:
+        yield from ("--every", _seconds(said["every_ns"]))
+    if said["copy_maps"]:
+        yield "--copy-maps"
 
 
 def _seconds(time_ns: int) -> str:

@@ -36,13 +36,18 @@ class Member:
 
     @property
     def rgb(self) -> Rgb:
-        """Its colour."""
+        """Its colour in pictures, which are on paper."""
         return robot_colour(self.index).ink
 
     @property
     def colour(self) -> str:
-        """Its colour as CSS has it."""
+        """Its colour in pictures, as CSS has it."""
         return as_hex(self.rgb)
+
+    @property
+    def tone(self) -> str:
+        """Its colour on the page, which is light or dark, as CSS has it."""
+        return f"light-dark({self.colour}, {as_hex(robot_colour(self.index).bright)})"
 
 
 def roster(robots: Sequence[str]) -> dict[str, Member]:

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from mapmerge.config import CellConfig
+from mapmerge.grid import Grid
 from mapmerge.merger import MergeResult
+from mapmerge.raster import shrunk
+from mapmerge.sim2 import Sim2
+from mapmerge.warp import Layer
 from replay.decisions import decisions
 from replay.events import Event, Finished, Merged, Report, RobotInput, Started
 from replay.html.roster import Member, roster
 from replay.html.series import Series
 
+MAX_SIDE_PX = 1600
+"""Longest side of a picture, and of the maps that pictures are made of."""
 MOST_DECISIONS = 2000
 """So many are kept of the first, and as many of the last."""
 
@@ -58,12 +64,22 @@ class Story:
     decisions_left_out: int
     first_ns: int
     last_ns: int
+    _shown: dict[str, Grid] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def settings(self) -> Mapping[str, Any]:
         """Settings of the run."""
         found: Mapping[str, Any] = self.report["settings"]
         return found
+
+    def layer(self, robot: str, merged_from_map: Sim2) -> Layer | None:
+        """Return a robot's map somewhere, no finer than it can be shown; None if it has none that knows anything."""
+        if self.result is None or robot not in self.result.grids:
+            return None
+        if robot not in self._shown:
+            self._shown[robot] = shrunk(self.result.grids[robot], MAX_SIDE_PX, self.cells)
+        grid = self._shown[robot]
+        return Layer(grid, merged_from_map) if grid.cells.size else None
 
     @property
     def cells(self) -> CellConfig:

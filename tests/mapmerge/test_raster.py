@@ -7,7 +7,7 @@ import pytest
 
 from mapmerge.config import CellConfig
 from mapmerge.grid import UNKNOWN_BYTE, Grid
-from mapmerge.overlay import compare, pixels_around, seen, values_on
+from mapmerge.raster import compared_on, pixels_around, seen, shrunk, values_on
 from mapmerge.sim2 import IDENTITY, Sim2
 from mapmerge.warp import Layer
 
@@ -63,30 +63,40 @@ def test_thin_walls_stay_where_pixels_are_large() -> None:
     assert walls.any(axis=0).sum() >= 4.0 / pixels.pixel_m - 1
 
 
-def compared(shift_m: float) -> tuple[int, int, int]:
-    """Return how many pixels are shared, agree and contradict if one of two rooms is moved upwards."""
+def walls_compared(shift_m: float) -> tuple[int, int]:
+    """Return how many pixels of walls agree and contradict if one of two rooms is moved upwards."""
     layers = [Layer(room(), IDENTITY), Layer(room(), Sim2(0.0, shift_m))]
     pixels = pixels_around(layers, 1000)
     assert pixels is not None
-    maps = [seen(values_on(layer, pixels, CELLS), CELLS) for layer in layers]
-    found = compare(maps, pixels.pixel_m, TOLERANCE_M)
-    return tuple(int(mask.sum()) for mask in (found.shared, found.agree, found.contradict))  # type: ignore[return-value]
+    walls = np.logical_or(*(seen(values_on(layer, pixels, CELLS), CELLS).walls for layer in layers))
+    found = compared_on(layers, pixels, CELLS, TOLERANCE_M)
+    return int((walls & found.agree).sum()), int((walls & found.contradict).sum())
 
 
 def test_walls_within_the_tolerance_agree() -> None:
-    assert compared(0.0) == (1200, 40, 0)
-    assert compared(0.1) == (1160, 80, 0)
+    assert walls_compared(0.0) == (40, 0)
+    assert walls_compared(0.1) == (40, 0)  # one of them lies where the other map knows nothing
 
 
 def test_a_wall_in_the_others_free_space_contradicts_it() -> None:
-    shared, agree, contradict = compared(1.0)
-    assert (shared, agree) == (800, 0)
-    assert contradict == 40  # that of the lower room lies where the other knows nothing
+    assert walls_compared(1.0) == (0, 40)  # that of the lower room lies where the other knows nothing
 
 
 def test_nobody_agrees_with_himself() -> None:
     layer = Layer(room(), IDENTITY)
     pixels = pixels_around([layer], 1000)
     assert pixels is not None
-    found = compare([seen(values_on(layer, pixels, CELLS), CELLS)], pixels.pixel_m, TOLERANCE_M)
-    assert not any(mask.any() for mask in (found.shared, found.agree, found.contradict))
+    found = compared_on([layer], pixels, CELLS, TOLERANCE_M)
+    assert not found.agree.any()
+    assert not found.contradict.any()
+
+
+@pytest.mark.parametrize(("most", "sides"), [(1000, (30, 40)), (40, (30, 40)), (39, (15, 20)), (10, (8, 10))])
+def test_a_map_is_shrunk_as_far_as_it_must_be_and_keeps_its_walls(most: int, sides: tuple[int, int]) -> None:
+    found = shrunk(room(), most, CELLS)
+    assert found.cells.shape == sides
+    assert (found.cells[0] == 100).all()
+
+
+def test_a_map_that_knows_nothing_can_be_shrunk() -> None:
+    assert shrunk(Grid(np.full((9, 9), -1, np.int8), 0.1), 4, CELLS).cells.size == 0

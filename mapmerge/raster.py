@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmerge.config import CellConfig
-from mapmerge.discs import Disc
 from mapmerge.grid import MAX_PERCENT, UNKNOWN_BYTE, Grid, Mask
+from mapmerge.overlap import AGREE, ALONE, CONTRADICT, overlap
 from mapmerge.plane import Box
+from mapmerge.resample import in_bands
 from mapmerge.sim2 import Sim2
 from mapmerge.warp import Layer, warped
 
@@ -39,6 +40,11 @@ class Pixels:
     pixel_m: float
     rows: int
     cols: int
+
+    @property
+    def lattice(self) -> Grid:
+        """A grid without cells, on whose lattice they are."""
+        return Grid(np.empty((0, 0), np.int8), self.pixel_m, Sim2(self.x_m, self.y_m))
 
     @property
     def width_m(self) -> float:
@@ -83,8 +89,7 @@ def pixels_around(layers: Sequence[Layer], max_side_px: int) -> Pixels | None:
 def values_on(layer: Layer, pixels: Pixels, config: CellConfig) -> NDArray[np.uint8]:
     """Return what a map says at each pixel: a percentage, or `UNKNOWN_BYTE`; walls stay where pixels are larger."""
     whole = Box(0, 0, pixels.rows, pixels.cols)
-    lattice = Grid(np.empty((0, 0), np.int8), pixels.pixel_m, Sim2(pixels.x_m, pixels.y_m))
-    found = warped(layer, lattice, config).tile(whole)
+    found = warped(layer, pixels.lattice, config).tile(whole)
     return np.full(whole.shape, UNKNOWN_BYTE, np.uint8) if found is None else found
 
 
@@ -115,46 +120,48 @@ class Comparison:
 
     Parameters
     ----------
-    shared
-        Where two maps or more know something.
     agree
-        Walls with a wall of another map within the tolerance.
+        Where they say the same, as `mapmerge.overlap.AGREE` has it.
     contradict
-        Walls without one, in free space of another map.
+        Where they say the contrary, as `mapmerge.overlap.CONTRADICT` has it.
     """
 
-    shared: Mask
     agree: Mask
     contradict: Mask
 
 
-def compare(maps: Sequence[Seen], pixel_m: float, tolerance_m: float) -> Comparison:
-    """Compare each map with all others.
+def compared_on(layers: Sequence[Layer], pixels: Pixels, config: CellConfig, tolerance_m: float) -> Comparison:
+    """Compare placed maps at each pixel.
 
     Parameters
     ----------
-    maps
-        At least one, of the same pixels.
-    pixel_m
-        Side of a pixel.
+    layers
+        The maps.
+    pixels
+        The pixels.
+    config
+        When a cell counts as occupied or free.
     tolerance_m
         How far walls that agree may be apart.
     """
-    disc = Disc.of(max(tolerance_m, pixel_m), pixel_m)
-    shape = maps[0].known.shape
-    knowing, near_of, free_of = np.zeros((3, *shape), np.uint16)
-    near = [disc.spread(item.walls.view(np.uint8)) > 0 for item in maps]
-    for item, close in zip(maps, near, strict=True):
-        knowing += item.known
-        near_of += close
-        free_of += item.free
-    agree, contradict = np.zeros((2, *shape), np.bool_)
-    for item, close in zip(maps, near, strict=True):
-        # a wall is near itself, and stands in no free space of its own map
-        matched = item.walls & (near_of > close)
-        agree |= matched
-        contradict |= item.walls & ~matched & (free_of > item.free)
-    return Comparison(knowing > 1, agree, contradict & ~agree)
+    most = max(pixels.rows, pixels.cols)
+    found = overlap(layers, pixels.lattice, config, tolerance_m=tolerance_m, max_side_cells=most)
+    kinds = np.full((pixels.rows, pixels.cols), ALONE, np.uint8)
+    if found is not None:
+        left = round((found.merged_from_grid.x_m - pixels.x_m) / pixels.pixel_m)
+        top = round((found.merged_from_grid.y_m - pixels.y_m) / pixels.pixel_m)
+        there = Box(0, 0, *found.kinds.shape).shifted(top, left)
+        whole = Box(0, 0, *kinds.shape)
+        inside = there.within(whole)
+        kinds[inside.slices(whole)] = found.kinds[inside.slices(there)]
+    return Comparison(kinds == AGREE, kinds == CONTRADICT)
+
+
+def shrunk(grid: Grid, max_side_cells: int, config: CellConfig) -> Grid:
+    """Return what a map knows, so many times as coarse that no side has more cells."""
+    known = grid.cropped_to_known()
+    factor = math.ceil(max(known.cells.shape) / max_side_cells)
+    return known if factor <= 1 else in_bands(known, factor, config)
 
 
 def _corners_m(grid: Grid) -> NDArray[np.float64]:
