@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -24,18 +25,24 @@ from replay.messages import FrameLink, TransformMessage
 from replay.options import RunOptions
 from replay.plan import Plan
 from replay.sources import open_source
-from replay.sources.base import TF_TYPES, SourceInfo
+from replay.sources.base import TF_TYPES, RawMessage, Source, SourceInfo
 from replay.transforms import TransformBuffer
 
 AUTO_BYTES = 256 << 20
-"""Larger recordings are read for it only when that is asked for: their transforms may be all over the file."""
+AUTO_MESSAGES = 100_000
+"""Larger recordings, and those with more transforms, are read for it only when that is asked for: it would take longer
+than a few seconds."""
 
 STEP_M = 0.1
 STEP_RAD = 0.1
 MOST_POSES = 10_000
 """After so many poses of a robot the steps are twice as long, and so on."""
 
-_INTERVAL_NS = 50_000_000
+_INTERVAL_NS = 80_000_000
+# Of a message: how many there are, a sequence number or what CDR begins with, a stamp, and then the first frame's name.
+_FRAME_AT, _LENGTH = 16, 4
+_LONGEST_FRAME = 256
+_MOST_PUBLISHERS = 1000
 _BASES = ("base_footprint", "base_link")
 
 _Pose = tuple[float, float, float]
@@ -95,9 +102,9 @@ class Trajectories:
         return [
             index
             for index, info in enumerate(self._plan.infos)
-            if _has_transforms(info)
+            if (messages := _transforms(info))
             and self._frames(index)
-            and (choice == "all" or self._plan.input_bytes(index) <= AUTO_BYTES)
+            and (choice == "all" or (messages <= AUTO_MESSAGES and self._plan.input_bytes(index) <= AUTO_BYTES))
         ]
 
     def _frames(self, index: int) -> dict[str, str]:
@@ -107,7 +114,7 @@ class Trajectories:
 
     def _opened(self, index: int) -> list[Iterator[tuple[int, int, Arrival]]]:
         path = self._options.runs[index].path
-        source = self._stack.enter_context(open_source(path, self._options.max_memory_bytes))
+        source = self._stack.enter_context(Thinned(open_source(path, self._options.max_memory_bytes)))
         self._trackers[index] = Tracker(self._frames(index))
         return [
             ((arrival.stamp_ns, index, arrival) for arrival in in_order(feed, Tally(), self._plan.window))
@@ -121,11 +128,71 @@ class Trajectories:
             self._trackers[index].take(None if always else stamp_ns, content.links)
 
 
+class Thinned:
+    """A recording of whose transforms ten a second of each publisher are read: decoding them is what takes time.
+
+    Who published a message is told from its length and from the first two frames in it, which stand at the same place
+    whatever recorded them.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._last_ns: dict[tuple[str, int, bytes], int] = {}
+        self.path, self.losses = source.path, source.losses
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Those of the recording."""
+        return self._source.files
+
+    @property
+    def info(self) -> SourceInfo:
+        """What the recording holds."""
+        return self._source.info
+
+    def close(self) -> None:
+        """Close the recording."""
+        self._source.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
+        """Yield messages as the recording does, without those that follow too soon."""
+        for raw in self._source.messages(topics):
+            key = raw.topic, len(raw.data), _first_frames(raw.data, raw.encoding == "cdr")
+            since_ns = raw.log_time_ns - self._last_ns.get(key, -_INTERVAL_NS)
+            if 0 <= since_ns < _INTERVAL_NS:
+                continue
+            if len(self._last_ns) > _MOST_PUBLISHERS:
+                self._last_ns.clear()
+            self._last_ns[key] = raw.log_time_ns
+            yield raw
+
+
+def _first_frames(data: bytes | memoryview, is_cdr: bool) -> bytes:
+    """Return the bytes of the first transform's frames in a message, whatever they are."""
+    child_at = _FRAME_AT + _LENGTH + _length(data, _FRAME_AT)
+    if is_cdr:
+        child_at += -child_at % _LENGTH
+    return bytes(data[_FRAME_AT : child_at + _LENGTH + _length(data, child_at)])
+
+
+def _length(data: bytes | memoryview, at: int) -> int:
+    return min(int.from_bytes(data[at : at + _LENGTH], "little"), _LONGEST_FRAME)
+
+
 @dataclass(slots=True)
 class _Track:
     """What is known of one robot's way."""
 
     base: str | None = None
+    links: int = 0
     last: _Pose | None = None
     seen_ns: int | None = None
     count: int = 0
@@ -171,11 +238,14 @@ class Tracker:
         return new
 
     def _look(self, robot: str, track: _Track, stamp_ns: int) -> None:
-        base = self._base(robot)
-        chain = None if base is None else self._buffer.chain(self._frames[robot], base)
+        track.seen_ns = stamp_ns
+        chain = None if track.base is None else self._buffer.chain(self._frames[robot], track.base)
+        if chain is None or track.links != len(self._known):
+            # which base it is depends on which frames there are
+            track.base, track.links = self._base(robot), len(self._known)
+            chain = None if track.base is None else self._buffer.chain(self._frames[robot], track.base)
         if chain is None:
             return
-        track.seen_ns = stamp_ns
         flat = chain.target_from_source.flat()
         pose = flat.x_m, flat.y_m, flat.yaw_rad
         if track.last is None or _is_step(track.last, pose, 2.0 ** (track.count // MOST_POSES)):
@@ -215,5 +285,6 @@ def _is_step(one: _Pose, other: _Pose, times: float) -> bool:
     return far_m >= STEP_M * times or abs(wrap_angle(one[2] - other[2])) >= STEP_RAD * times
 
 
-def _has_transforms(info: SourceInfo) -> bool:
-    return any(item.msgtype in TF_TYPES and item.message_count for item in info.topics)
+def _transforms(info: SourceInfo) -> int:
+    """Return how many messages with transforms a recording holds."""
+    return sum(item.message_count for item in info.topics if item.msgtype in TF_TYPES)

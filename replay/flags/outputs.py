@@ -43,7 +43,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         choices=("none", "auto", "all"),
         default="auto",
         help="read from /tf where robots drove, to show it in the Rerun recording: of no recording, of those of up to "
-        "256 MiB, as transforms may be all over a file, or of all (default: %(default)s)",
+        "256 MiB and 100 000 messages of transforms, or of all, however long that takes (default: %(default)s)",
     )
     outputs.add_argument("--json", action="store_true", help="print the report instead of a table")
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from mapmerge.sim2 import Sim2
+from replay.codec import decode_transforms
 from replay.events import Event, Merged
 from replay.messages import FrameLink
 from replay.options import RunOptions, TrajectoryChoice
@@ -17,7 +18,8 @@ from replay.pipeline import merge
 from replay.plan import Plan
 from replay.pose3 import Pose3
 from replay.runs import RunPath
-from replay.trajectories import AUTO_BYTES, MOST_POSES, STEP_M, Tracker
+from replay.sources import open_source
+from replay.trajectories import AUTO_BYTES, MOST_POSES, STEP_M, Thinned, Tracker
 from tests.bags import SECOND, Recorded, write_mcap, write_rosbag1, write_rosbag2
 from tests.program import Program
 from tests.runs import growing, in_log_order, link, linked, two_robots
@@ -108,6 +110,20 @@ def test_without_a_base_or_with_frames_that_are_shared_nobody_moves(tmp_path: Pa
     assert driven(replayed(write_mcap(tmp_path / "shared.mcap", nameless))) == {}
     named = in_log_order(two_robots(), drives("r1", frame="map"), drives("r2", frame="map"))
     assert set(driven(replayed(write_mcap(tmp_path / "named.mcap", named)))) == {"r1", "r2"}
+
+
+def test_of_transforms_that_come_often_enough_are_read(tmp_path: Path) -> None:
+    fast = [
+        linked(0.01 * index, link("r1/map" if is_map else "r1/odom", "r1/odom" if is_map else "r1/base_link"))
+        for index in range(200)
+        for is_map in (True, False)
+    ]
+    for number, write in enumerate((write_mcap, write_rosbag1)):
+        path = write(tmp_path / f"fast{number}", in_log_order(recorded(), fast))
+        with open_source(path) as source:
+            raws = list(Thinned(source).messages(["/tf"]))
+            assert len(raws) == pytest.approx(80 + 2 * 25, abs=2)
+            assert all(isinstance(decode_transforms(raw).links[0], FrameLink) for raw in raws)
 
 
 # The tracker
