@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 from replay.skip_cause import SkipCause
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from mapmerge.merger import MergeResult
     from mapmerge.render import Picture
 
@@ -118,6 +121,20 @@ class RobotPicture:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Moved:
+    """Where a robot was since the tick before, as recorded transforms say; thinned to steps that can be seen.
+
+    Parameters
+    ----------
+    poses
+        Shape (N, 3), at least one, in order of time: x and y in metres, yaw in radians, in the robot's map frame.
+    """
+
+    robot: str
+    poses: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Merged:
     """Messages with maps arrived at this time and were taken in.
 
@@ -133,6 +150,8 @@ class Merged:
         Intermediate images that are due, rendered once for all sinks.
     done, total
         Messages read so far, and in all.
+    moved
+        Where robots were since the tick before, where that was recorded and is wanted.
     """
 
     stamp_ns: int
@@ -142,6 +161,7 @@ class Merged:
     timing: Timing
     done: int
     total: int
+    moved: tuple[Moved, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,6 +20,7 @@ DEFAULT_REORDER_WINDOW_NS = 5 * NS_PER_S
 
 ImageChoice = Literal["none", "changed", "all"]
 ClockChoice = Literal["header", "log"]
+TrajectoryChoice = Literal["none", "auto", "all"]
 
 
 def seconds_to_ns(text: str) -> int:
@@ -100,6 +101,9 @@ class RunOptions:
         The most memory that one robot's map, the merged map, or a message or chunk that is read may need; None for
         what `MergeConfig` and `replay.sources.memory` allow. What needs more is not used. It affects results, but is no
         setting of a machine: the same limit gives the same outcome everywhere.
+    trajectories
+        Of which recordings it is read where robots drove: ``auto`` leaves out large ones. It changes no outcome, and
+        is shown only.
     jobs
         How many threads work at once: more than one read ahead, match pairs and write beside the merging. The outcome
         is the same.
@@ -119,6 +123,7 @@ class RunOptions:
     use_tf: bool = False
     merge: MergeConfig = field(default_factory=MergeConfig)
     max_memory_bytes: int | None = None
+    trajectories: TrajectoryChoice = "none"
     jobs: int = 1
 
     def settings(self) -> Mapping[str, Any]:

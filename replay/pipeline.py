@@ -26,6 +26,7 @@ from replay.plan import Plan, memory_limit, open_plan
 from replay.report import ReportBuilder
 from replay.sinks.base import Sink
 from replay.timeline import Transforms, ticks
+from replay.trajectories import Trajectories
 
 
 def events(plan: Plan, options: RunOptions, written: OutputOptions | None = None) -> Iterator[Event]:
@@ -60,6 +61,7 @@ def events(plan: Plan, options: RunOptions, written: OutputOptions | None = None
         mapped = stack.enter_context(ThreadPoolExecutor(options.jobs)).map if options.jobs > 1 else map
         merger = Merger([item.robot for item in plan.robots], merge_config(options), mapped)
         gallery = Gallery(options.images, merger.explain)
+        trajectories = stack.enter_context(Trajectories(plan, options))
         for tick in items:
             if isinstance(tick, Transforms):
                 beliefs.take(tick)
@@ -86,7 +88,8 @@ def events(plan: Plan, options: RunOptions, written: OutputOptions | None = None
             timing = Timing(merged - begin, perf_counter() - merged)
             report.take(tick.stamp_ns, result, priors)
             done, stamp_ns = done + tick.messages, tick.stamp_ns
-            yield Merged(stamp_ns, result, report.build(stamp_ns, result, inputs), pictures, timing, done, total)
+            moved = trajectories.until(stamp_ns)
+            yield Merged(stamp_ns, result, report.build(stamp_ns, result, inputs), pictures, timing, done, total, moved)
     yield from _noted(report, beliefs.missed())
     final = report.build(stamp_ns, merger.result, plan.describe_inputs(tallies))
     if stamp_ns is None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from replay.selection import Selected, select
 from replay.sources import open_sources
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
 from replay.stamps import LAST_NS
-from replay.transform_feeds import transform_feeds
+from replay.transform_feeds import feeds_of, transform_feeds
 
 MERGED_FRAME = "merged"
 
@@ -45,6 +46,8 @@ class Plan:
         Which transforms are read; None if none are to be used.
     mapped
         The robots of which there is a map that can be used.
+    feeds_of_transforms
+        Returns what is read of the transforms of one input, opened once more, given its index: for who looks on.
     """
 
     infos: tuple[SourceInfo, ...]
@@ -54,6 +57,11 @@ class Plan:
     map_frames: Mapping[str, str | None]
     transform_feeds: tuple[Feed, ...] | None
     mapped: frozenset[str]
+    feeds_of_transforms: Callable[[int, Source], tuple[Feed, ...]]
+
+    def input_bytes(self, index: int) -> int:
+        """Return how large an input is."""
+        return _size_bytes(self.feeds[index].source.path)
 
     def files(self) -> list[Path]:
         """Return the files that are read."""
@@ -165,6 +173,7 @@ def _plan(sources: list[Source], options: RunOptions) -> Plan:
         {item.robot: _bare(frame_ids.get(item.robot)) for item in selected},
         transform_feeds(sources, probes, offsets, options.clock) if options.use_tf else None,
         mapped,
+        partial(feeds_of, probes=probes, offsets_ns=offsets, choice=options.clock),
     )
 
 

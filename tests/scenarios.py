@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from mapmerge.grid import Grid
+from mapmerge.sim2 import Sim2
 from replay.events import Event, Merged
 from replay.init_pose import InitPose
 from replay.options import RunOptions
@@ -39,6 +40,7 @@ class Scenario:
     images: str = "none"
     init_poses: tuple[InitPose, ...] = ()
     use_tf: bool = False
+    trajectories: str = "none"
 
 
 def _nothing() -> Grid:
@@ -91,6 +93,14 @@ SCENARIOS: dict[str, Scenario] = {
         init_poses=(InitPose("r2", *_pose_of("r2")),),
         use_tf=True,
     ),
+    "driven": Scenario(
+        lambda: in_log_order(
+            two_robots(),
+            [linked(0.5 * index, link("map", "r1/base_link", Sim2(0.2 * index, 1.0))) for index in range(50)],
+        ),
+        lambda last: [item.robot for item in last.moved] == ["r1"],
+        trajectories="all",
+    ),
     "one_robot": Scenario(lambda: growing("r1"), lambda last: _statuses(last) == ["reference"], images="changed"),
 }
 
@@ -106,6 +116,7 @@ def events_of(name: str) -> tuple[Event, ...]:
             images=scenario.images,  # type: ignore[arg-type]
             init_poses=scenario.init_poses,
             use_tf=scenario.use_tf,
+            trajectories=scenario.trajectories,  # type: ignore[arg-type]
         )
         events = tuple(merge(options))
     last = next((event for event in reversed(events) if isinstance(event, Merged)), None)

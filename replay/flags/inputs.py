@@ -110,6 +110,8 @@ def run_options(options: argparse.Namespace, *, needs_runs: bool = True) -> RunO
         max_memory_bytes=(
             read_flag("--max-memory", options.max_memory, size_to_bytes) if options.max_memory is not None else None
         ),
+        # for outputs that show them
+        trajectories="none" if getattr(options, "no_rrd", True) else getattr(options, "trajectories", "none"),
         jobs=rules.jobs(options.jobs) if hasattr(options, "jobs") else 1,
         **placed,
     )

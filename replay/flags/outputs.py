@@ -44,6 +44,13 @@ def add(parser: argparse.ArgumentParser) -> None:
         default="changed",
         help="which intermediate images are written (default: %(default)s)",
     )
+    outputs.add_argument(
+        "--trajectories",
+        choices=("none", "auto", "all"),
+        default="auto",
+        help="read from /tf where robots drove, to show it in the Rerun recording: of no recording, of those of up to "
+        "256 MiB and 100 000 messages of transforms, or of all, however long that takes (default: %(default)s)",
+    )
     outputs.add_argument("--json", action="store_true", help="print the report instead of a table")
 
 

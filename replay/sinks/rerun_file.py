@@ -24,6 +24,7 @@ from replay.sinks.rerun_entities import ABOUT, DECISIONS, LEGEND, ROBOTS, SKIPPE
 from replay.sinks.rerun_errors import rerun_errors
 from replay.sinks.rerun_maps import MapScene
 from replay.sinks.rerun_overlap import OverlapScene
+from replay.sinks.rerun_paths import PathScene
 from replay.sinks.rerun_plots import Plots
 from replay.sinks.rerun_status import Statuses
 from replay.sinks.rerun_stream import RrdStream
@@ -80,6 +81,7 @@ class _Writer:
         cells = CellConfig(**merge["cells"])
         self._maps = MapScene(self.stream, robots, cells)
         self._overlap = OverlapScene(self.stream, cells, merge["verify"]["tolerance_m"])
+        self._paths = PathScene(self.stream, robots)
         limit_of = "confidence" if merge["method"] in CALIBRATED else "acceptance"
         self._plots = Plots(self.stream, robots, limit_of, merge["verify"][f"min_{limit_of}"])
         self._statuses = Statuses(self.stream, robots)
@@ -121,6 +123,7 @@ class _Writer:
         self._stamp_ns = event.stamp_ns
         self._maps.show(event.result)
         self._overlap.show(event.result)
+        self._paths.show(event.moved, self._maps.shown)
         for item in event.pictures:
             self._show_picture(item)
         self._show_candidates(event)

@@ -81,6 +81,11 @@ class MapScene:
         """What all maps cover now; None without maps."""
         return self._extent
 
+    @property
+    def shown(self) -> set[str]:
+        """Robots whose map frame lies somewhere."""
+        return {robot for robot, shown in self._shown.items() if shown.pose is not None}
+
     def show(self, result: MergeResult) -> None:
         """Log what differs from what was logged before."""
         self._show_merged(result.merged)

@@ -18,11 +18,10 @@ _STATUSES = {"unmerged": "**not merged**", "no_map": "**without a map**"}
 _EVENTS = {"jumped": "jumped in its own frame", "withdrawn": "was withdrawn for a time"}
 
 LEGEND = """\
-**Walls** and ways are in the colour of the robot that mapped or drove them. Grey floors are known to one map alone.
+**Walls** are in the colour of the robot that mapped them, **thin lines** the ways that robots drove.
 
-**Green** ground: two maps or more know it, and agree. **Red**: a wall of one map in free space of another.
-
-A map that is **not merged** stands beside the merged one.
+**Green** ground: two maps or more know it, and agree. **Red**: a wall of one map in free space of another. \
+**Grey**: one map alone knows it. A map that is not merged stands beside the others.
 """
 
 

@@ -22,7 +22,7 @@ from mapmerge.merger import Merger
 from mapmerge.outcome import Status
 from mapmerge.sim2 import IDENTITY, Sim2
 from replay.errors import OutputError
-from replay.events import Event, Finished, Merged, Noted, RobotInput, Skipped, Started, Timing
+from replay.events import Event, Finished, Merged, Moved, Noted, RobotInput, Skipped, Started, Timing
 from replay.gallery import Gallery
 from replay.options import OutputOptions, RunOptions
 from replay.report import ReportBuilder
@@ -32,6 +32,7 @@ from replay.sinks.rerun_file import RerunSink
 from replay.sinks.rerun_labels import label_places_m
 from replay.sinks.rerun_layout import Box, lay_out
 from replay.sinks.rerun_maps import MAX_SIDE_CELLS
+from replay.sinks.rerun_paths import PIECE_POSES
 from replay.sinks.rerun_stream import RrdStream
 from replay.skip_cause import SkipCause
 from tests.floors import filled
@@ -193,6 +194,27 @@ def test_the_overlap_is_tinted_while_maps_are_placed(recording: Path, story: lis
     last = next(event for event in reversed(story) if isinstance(event, Merged))
     area_m2 = green.sum() * entity.rows[2]["GridMap:cell_size"][0] ** 2
     assert area_m2 == pytest.approx(last.result.robots["r2"].agreement.overlap_m2, rel=0.2)
+
+
+def test_ways_grow_piece_by_piece_and_are_parted_where_robots_jump(story: list[Event], tmp_path: Path) -> None:
+    ticks = [event for event in story if isinstance(event, Merged)]
+    straight = np.zeros((PIECE_POSES + 50, 3))
+    straight[:, 0] = 0.1 * np.arange(len(straight))
+    jumped = straight[:9] + np.array([0.0, 50.0, 1.5])
+    ways = {1: Moved("r1", straight), 2: Moved("r1", jumped), 0: Moved("r4", straight)}
+    moved = {id(ticks[index]): way for index, way in ways.items()}
+    events = [replace(each, moved=(moved[id(each)],)) if id(each) in moved else each for each in story]
+    path = written(tmp_path / "ways.rrd", events)
+    assert Entity(path, "/merged/robots/r1/path/0").stamps == [STAMPS[1]]
+    last = Entity(path, "/merged/robots/r1/path/1")
+    assert last.stamps == [STAMPS[1], STAMPS[2]]
+    assert [len(strip) for strip in last.rows[1]["LineStrips3D:strips"]] == [51, 9]
+    assert last.rows[0]["LineStrips3D:strips"][0][-1][:2] == pytest.approx(straight[-1, :2])
+    position = Entity(path, "/merged/robots/r1/position").rows[-1]
+    assert position["Points3D:positions"][0][:2] == pytest.approx(jumped[-1, :2])
+    x, y, _ = position["Arrows3D:vectors"][0]
+    assert np.arctan2(y, x) == pytest.approx(1.5)
+    assert not any("/r4/path" in chunk.entity_path for chunk in RrdReader(path).stream())
 
 
 def test_a_placed_map_is_under_its_placement(recording: Path) -> None:
