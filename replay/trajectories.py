@@ -18,9 +18,10 @@ from typing import Self
 import numpy as np
 
 from mapmerge.sim2 import wrap_angle
-from replay.arrivals import Arrival, Tally, in_order
+from replay.arrivals import Arrival, in_order
 from replay.errors import ReplayError
 from replay.events import Moved, RobotInput
+from replay.feeds import Tally
 from replay.messages import FrameLink, TransformMessage
 from replay.options import RunOptions
 from replay.plan import Plan
