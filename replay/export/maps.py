@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mapmerge.grid import Grid
-from replay.arrivals import Tally
 from replay.errors import InputError, UsageError
 from replay.events import Noted, Skipped
+from replay.feeds import Tally
 from replay.options import RunOptions, TimeBound
 from replay.plain_text import listed, plain
 from replay.plan import open_plan
