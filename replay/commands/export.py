@@ -207,6 +207,8 @@ def _tell(found: Maps, paths: Sequence[str], options: argparse.Namespace) -> Non
     for grid in found.grids.values():
         turn_deg = math.degrees(grid.map_from_grid.yaw_rad)
         say(f"replay: {grid.cols} × {grid.rows} cells of {grid.resolution_m:g} m{when}")
+        if not grid.known.any():
+            say("replay: nothing is known in it: it is the map of a time when there was none")
         if options.to == "map_server" and abs(turn_deg) > _NO_TURN_DEG:
             say(f"replay: its origin is turned by {turn_deg:.2f}°; nav2's costmaps and AMCL take no notice of that")
     say(f"replay: wrote {', '.join(plain(path) for path in paths)}")

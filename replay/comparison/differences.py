@@ -11,6 +11,8 @@ from replay.errors import UsageError
 from replay.run_result import RobotResult, RunResult
 
 _DIGITS = 6
+_WRITTEN = "outputs"
+"""The settings of what is written, which change no outcome."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +191,8 @@ def _notes(before: RunResult, after: RunResult, frame: Sim2 | None) -> Iterator[
     if before.digests != after.digests:
         names = sorted(name for name in {*before.digests, *after.digests} if _differs(before, after, name))
         yield f"the inputs are not the same: {', '.join(names)}"
-    changed = sorted(_changed(before.settings, after.settings))
+    one, other = ({**run.settings, _WRITTEN: None} for run in (before, after))
+    changed = sorted(_changed(one, other))
     if changed:
         yield f"the settings are not the same: {', '.join(changed)}"
     if frame is None:

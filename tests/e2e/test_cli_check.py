@@ -222,6 +222,7 @@ def test_a_summary_is_appended_as_markdown(replay: Program, outcome: Path) -> No
     ("text", "said"),
     [
         ("", "there is nothing in it"),
+        ("robots: {r1: reference}\nrobots: {r2: merged}", "line 2: this is no YAML: found duplicate key"),
         ("robots: [", "line 1: this is no YAML"),
         ("robots: {}", "line 1: robots is {}; expected at least one robot"),
         ("reference: r1", "it has no 'robots'"),
@@ -271,6 +272,29 @@ def test_a_scale_counts_where_it_is_given(replay: Program, outcome: Path) -> Non
     assert checked(replay, outcome, f"robots: {{r2: {{status: merged, pose: {pose}}}}}").status == 1
     pose = POSE.replace("{", "{scale: 1.001, ")
     assert checked(replay, outcome, f"robots: {{r2: {{status: merged, pose: {pose}}}}}").status == 0
+
+
+def test_interrupted_when_all_is_written_says_so(replay: Program, two: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("replay.checks.findings.findings", interrupted)
+    for flags, said in ((("-o", "new.mcap"), "the outputs are written"), ((), "nothing was written")):
+        ran = checked(replay, two, "robots: {r1: reference}", *flags)
+        assert ran.status == 130
+        assert ran.err.splitlines()[-1] == f"replay: interrupted; {said}"
+        assert (replay.folder / "new.mcap").exists()
+
+
+def test_no_recording_at_all_is_refused(replay: Program) -> None:
+    (replay.folder / "expect.yaml").write_text("robots: {r1: reference}", encoding="utf-8")
+    assert "RUN is missing" in replay("check", "--expect", "expect.yaml").error
+
+
+def test_settings_may_come_from_a_file(replay: Program, two: Path) -> None:
+    (replay.folder / "settings.toml").write_text('robots = "r2,r1"\n', encoding="utf-8")
+    ran = checked(replay, two, "reference: r2\nrobots: {r1: merged}", "--config", "settings.toml")
+    assert ran.status == 0, ran.out + ran.err
 
 
 @pytest.mark.parametrize(

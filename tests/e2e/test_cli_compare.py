@@ -135,6 +135,7 @@ def test_other_settings_and_versions_are_named_and_no_difference(replay: Program
     def other_settings(other: dict[str, Any]) -> None:
         other["version"] = "9.9"
         other["settings"]["merge"]["verify"]["min_confidence"] = 0.5
+        other["settings"]["outputs"] = {"copy_maps": "of no account"}
 
     ran = compared(replay, report, changed(report, other_settings))
     assert ran.status == 0
