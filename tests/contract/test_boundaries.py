@@ -258,14 +258,8 @@ OURS = {
     "folder": ("replay.sources.rosbag2.folder.listed_parts", _reading(*OPEN_FOLDER)),
     "folder, a part": ("replay.sources.rosbag2.folder.plain_copy", _reading(*OPEN_FOLDER)),
     "compressed": ("replay.sources.compressed_file.plain_copy", _reading(_compressed, "run.mcap")),
-    "saved map": (
-        "replay.sources.map_server.saved_map._resolution_m",
-        _reading(*OPEN_SAVED_MAP),
-    ),
-    "saved map, its image": (
-        "replay.sources.map_server.image_file.header_of",
-        _reading(*OPEN_SAVED_MAP),
-    ),
+    "saved map": ("replay.sources.map_server.saved_map._resolution_m", _reading(*OPEN_SAVED_MAP)),
+    "saved map, its image": ("replay.sources.map_server.image_file.header_of", _reading(*OPEN_SAVED_MAP)),
 }
 BUGS = (TypeError(), AttributeError(), KeyError(), IndexError(), AssertionError(), ZeroDivisionError(), RuntimeError())
 
