@@ -6,14 +6,16 @@ import json
 import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from replay.figures import size
 from replay.html.story import Story
-from replay.options import DEFAULT_REORDER_WINDOW_NS, NS_PER_S, RunOptions
+from replay.options import DEFAULT_REORDER_WINDOW_NS, NS_PER_S, OutputOptions, RunOptions
 from replay.words import moment
 
 _FLAGS_OF_MERGE = {"merge.method", "merge.scale", "merge.verify.min_confidence"}
+_DEFAULTS = {**RunOptions(()).settings(), "outputs": OutputOptions(Path()).settings("changed")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +68,13 @@ class Provenance:
 def provenance(story: Story) -> Provenance:
     """Return what a reader needs to have the same again."""
     report = story.report
-    ours = dict(_flat(RunOptions(()).settings()))
+    ours = dict(_flat(_DEFAULTS))
     settings = tuple(
         Setting(name, _text(value), None if value == ours.get(name) else _text(ours.get(name)))
         for name, value in _flat(story.settings)
     )
     changed = tuple(item for item in settings if item.default is not None)
-    again, why_not = command(story, [item.name for item in changed])
+    again, why_not = command(story)
     return Provenance(
         tuple(_input(item) for item in report["inputs"]),
         changed,
@@ -85,10 +87,8 @@ def provenance(story: Story) -> Provenance:
     )
 
 
-def command(story: Story, changed: list[str]) -> tuple[str | None, str]:
+def command(story: Story) -> tuple[str | None, str]:
     """Return the command that gives this outcome in the folder of its inputs or, if there is none, why."""
-    if any(name.startswith("merge.") and name not in _FLAGS_OF_MERGE for name in changed):
-        return None, "It was run from Python, with settings that no flag can say: those above that differ."
     found = shlex.join(["replay", "merge", *_runs(story), *_flags(story)])
     if not found.isprintable():
         return None, "A name in it holds characters that cannot be typed."
@@ -109,7 +109,8 @@ def _runs(story: Story) -> Iterator[str]:
 
 def _flags(story: Story) -> Iterator[str]:
     said = story.settings
-    yield from ("--robots", ",".join(item.robot for item in story.robots))
+    if said["robots"] is not None:
+        yield from ("--robots", ",".join(said["robots"]))
     for choice in said["topics"]:
         yield from ("--topic", f"{choice['robot']}={choice['topic']}" if choice["robot"] else str(choice["topic"]))
     if said["clock"] != "header":
@@ -125,6 +126,8 @@ def _flags(story: Story) -> Iterator[str]:
     if said["max_memory_bytes"] is not None:
         yield from ("--max-memory", f"{said['max_memory_bytes']}")
     yield from _placing_flags(said)
+    yield from _threshold_flags(said)
+    yield from _output_flags(said["outputs"] or _DEFAULTS["outputs"])
 
 
 def _placing_flags(said: Mapping[str, Any]) -> Iterator[str]:
@@ -143,6 +146,24 @@ def _placing_flags(said: Mapping[str, Any]) -> Iterator[str]:
     ):
         if value != default:
             yield from (flag, str(value))
+
+
+def _threshold_flags(said: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what has no flag of its own."""
+    ours = dict(_flat({"merge": _DEFAULTS["merge"]}))
+    for name, value in _flat({"merge": said["merge"]}):
+        if value != ours.get(name) and name not in _FLAGS_OF_MERGE:
+            yield from ("--set", f"{name}={_text(value)}")
+
+
+def _output_flags(outputs: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what decides what the MCAP holds."""
+    if outputs["images"] != _DEFAULTS["outputs"]["images"]:
+        yield from ("--images", str(outputs["images"]))
+    if outputs["every_ns"]:
+        yield from ("--every", _seconds(outputs["every_ns"]))
+    if outputs["copy_maps"]:
+        yield "--copy-maps"
 
 
 def _seconds(time_ns: int) -> str:

@@ -179,6 +179,14 @@ def test_a_topic_is_only_ever_text(replay: Program, tmp_path: Path, name: str) -
         ("samples/two_robots.mcap",),
         ("samples/three_robots.bag", "--robots", "r2,r1", "--start", "1.5", "--stop", "120"),
         ("alpha=samples/bag_per_robot/alpha", "bravo=samples/bag_per_robot/bravo", "--min-confidence", "0.95"),
+        (
+            "samples/two_robots.mcap",
+            "--set",
+            "merge.verify.min_overlap_m2=70",
+            "--set",
+            "merge.refine.reject_m=[0.4, 0.2]",
+        ),
+        ("samples/two_robots.mcap", "--every", "2.5", "--copy-maps", "--stop", "40"),
         ("samples/two_robots.mcap", "--clock", "log", "--reorder-window", "0.25", "--max-memory", "300MB"),
         ("samples/two_robots.mcap", "--init-pose", "r2=1,2,30deg+-5,+-5,+-90deg", "--align-starts", "--stop", "40"),
         (
@@ -207,6 +215,7 @@ def test_the_command_that_it_names_gives_the_same_again(
     assert replay(*command, "-o", again, "--no-rrd", *QUIET).status == 0
     before, after = (json.loads(path.with_suffix(".json").read_text()) for path in (one, again))
     assert before == after
+    assert one.read_bytes() == again.read_bytes()
 
 
 def test_placements_can_be_given_to_another_run(replay: Program, two: Path, tmp_path: Path) -> None:
