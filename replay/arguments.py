@@ -13,6 +13,8 @@ from typing import NoReturn
 from replay import __version__
 from replay.commands import COMMANDS, load
 from replay.errors import UsageError
+from replay.synonyms import COMMANDS as OTHER_COMMANDS
+from replay.synonyms import FLAGS as SYNONYMS
 
 _DESCRIPTION = "Merge the occupancy grid maps that several robots recorded, offline, at each timestamp."
 _EXAMPLES = """\
@@ -97,8 +99,20 @@ class Parser(argparse.ArgumentParser):
         """Return which flags may have been meant instead of those that there are not."""
         unknown = re.findall(r"(?<!\S)--?[a-zA-Z][^\s=]*", message.partition("unrecognized arguments: ")[2])
         flags = [flag for action in self._actions for flag in action.option_strings]
-        found = [close for flag in unknown for close in closest(flag, flags)]
+        found = [close for flag in unknown for close in self._like(flag, flags)]
         return f"; did you mean {' or '.join(dict.fromkeys(found))}?" if found else ""
+
+    def _like(self, unknown: str, flags: Sequence[str]) -> list[str]:
+        """Return the flag that another program calls like this, one like it, or a setting that has no flag."""
+        if SYNONYMS.get(unknown) in flags:
+            return [SYNONYMS[unknown]]
+        found = closest(unknown, flags)
+        if found or not self.takes_settings:
+            return found
+        from replay.settings.fields import leaves
+
+        names = {key.rpartition(".")[2]: key for key in reversed(list(leaves()))}
+        return [f"--set {names[name]}=…" for name in closest(unknown.replace("-", "_").lstrip("_"), names)]
 
 
 def none_of(value: str, choices: Sequence[str]) -> str:
@@ -185,7 +199,7 @@ def _no_command(given: Sequence[str]) -> str:
     commands = ", ".join(COMMANDS)
     if not given:
         return f"a command is missing; expected one of {commands}, such as `replay merge run.mcap`"
-    meant = closest(given[0], COMMANDS)
+    meant = OTHER_COMMANDS.get(given[0]) or next(iter(closest(given[0], COMMANDS)), None)
     if meant:
-        return f"{given[0]}: there is no such command; did you mean {meant[0]}?"
+        return f"{given[0]}: there is no such command; did you mean {meant}?"
     return f"{given[0]}: there is no such command; expected one of {commands}; to merge: replay merge {given[0]}"

@@ -66,6 +66,7 @@ def add(parser: argparse.ArgumentParser, *config_names: str) -> None:
 def add_settings(parser: argparse.ArgumentParser, *names: str) -> None:
     """Add the flags that say settings, the file by these other names, too."""
     parser.add_argument(
+        "-c",
         "--config",
         *names,
         metavar="FILE",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from replay.options import DEFAULT_REORDER_WINDOW_NS, NS_PER_S, OutputOptions, R
 from replay.words import moment
 
 _FLAGS_OF_MERGE = {"merge.method", "merge.scale", "merge.verify.min_confidence"}
+_DEFAULTS = {**RunOptions(()).settings(), "outputs": OutputOptions(Path()).settings("changed")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,13 +68,13 @@ class Provenance:
 def provenance(story: Story) -> Provenance:
     """Return what a reader needs to have the same again."""
     report = story.report
-    ours = dict(_flat(_defaults()))
+    ours = dict(_flat(_DEFAULTS))
     settings = tuple(
         Setting(name, _text(value), None if value == ours.get(name) else _text(ours.get(name)))
         for name, value in _flat(story.settings)
     )
     changed = tuple(item for item in settings if item.default is not None)
-    again, why_not = command(story, changed)
+    again, why_not = command(story)
     return Provenance(
         tuple(_input(item) for item in report["inputs"]),
         changed,
@@ -86,19 +87,9 @@ def provenance(story: Story) -> Provenance:
     )
 
 
-def _defaults() -> Mapping[str, Any]:
-    return {**RunOptions(()).settings(), "outputs": OutputOptions(Path("out.mcap")).settings("changed")}
-
-
-def command(story: Story, changed: Sequence[Setting]) -> tuple[str | None, str]:
+def command(story: Story) -> tuple[str | None, str]:
     """Return the command that gives this outcome in the folder of its inputs or, if there is none, why."""
-    thresholds = [
-        part
-        for item in changed
-        if item.name.startswith("merge.") and item.name not in _FLAGS_OF_MERGE
-        for part in ("--set", f"{item.name}={item.value}")
-    ]
-    found = shlex.join(["replay", "merge", *_runs(story), *_flags(story), *thresholds])
+    found = shlex.join(["replay", "merge", *_runs(story), *_flags(story)])
     if not found.isprintable():
         return None, "A name in it holds characters that cannot be typed."
     return found, ""
@@ -135,7 +126,8 @@ def _flags(story: Story) -> Iterator[str]:
     if said["max_memory_bytes"] is not None:
         yield from ("--max-memory", f"{said['max_memory_bytes']}")
     yield from _placing_flags(said)
-    yield from _output_flags(said.get("outputs") or _defaults()["outputs"])
+    yield from _threshold_flags(said)
+    yield from _output_flags(said["outputs"] or _DEFAULTS["outputs"])
 
 
 def _placing_flags(said: Mapping[str, Any]) -> Iterator[str]:
@@ -156,12 +148,21 @@ def _placing_flags(said: Mapping[str, Any]) -> Iterator[str]:
             yield from (flag, str(value))
 
 
-def _output_flags(said: Mapping[str, Any]) -> Iterator[str]:
-    if said["images"] != "changed":
-        yield from ("--images", str(said["images"]))
-    if said["every_ns"]:
-        yield from ("--every", _seconds(said["every_ns"]))
-    if said["copy_maps"]:
+def _threshold_flags(said: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what has no flag of its own."""
+    ours = dict(_flat({"merge": _DEFAULTS["merge"]}))
+    for name, value in _flat({"merge": said["merge"]}):
+        if value != ours.get(name) and name not in _FLAGS_OF_MERGE:
+            yield from ("--set", f"{name}={_text(value)}")
+
+
+def _output_flags(outputs: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what decides what the MCAP holds."""
+    if outputs["images"] != _DEFAULTS["outputs"]["images"]:
+        yield from ("--images", str(outputs["images"]))
+    if outputs["every_ns"]:
+        yield from ("--every", _seconds(outputs["every_ns"]))
+    if outputs["copy_maps"]:
         yield "--copy-maps"
 
 

@@ -12,7 +12,9 @@ import cv2
 import numpy as np
 import pytest
 
-from replay import __version__
+from replay import __version__, synonyms
+from replay.arguments import command_parser
+from replay.commands import COMMANDS
 from tests import bags
 from tests.bags import write_mcap
 from tests.program import Program, in_process_of_its_own
@@ -83,6 +85,11 @@ def test_require_all_counts_a_robot_without_a_map(replay: Program, tmp_path: Pat
         (("merge", "run.mcap", "--nonsense"), "unrecognized arguments: --nonsense; `replay merge --help` lists"),
         (("merge", "run.mcap", "--robot", "r1"), "did you mean --robots?"),
         (("merge", "run.mcap", "--cloc", "log"), "did you mean --clock?"),
+        (("merge", "run.mcap", "--start-offset", "5"), "did you mean --start?"),
+        (("merge", "run.mcap", "--silent"), "did you mean --quiet?"),
+        (("merge", "run.mcap", "--min-overlap", "4"), "did you mean --set merge.verify.min_overlap_m2=…?"),
+        (("inspect", "run.mcap"), "did you mean info?"),
+        (("help",), "did you mean --help?"),
         (("merge", "run.mcap", "--clock", "sundial"), "--clock: 'sundial' is none of header, log;"),
         (("merge", "run.mcap", "--images", "change"), "is none of none, changed, all; did you mean changed?"),
     ],
@@ -248,3 +255,12 @@ def test_as_a_process(two: Path, tmp_path: Path) -> None:
 
 def test_version(replay: Program) -> None:
     assert replay("--version").out == f"replay {__version__}\n"
+
+
+def test_what_others_call_it_is_called_something_here() -> None:
+    flags = {
+        flag for name in COMMANDS for _, action in command_parser(name).grouped() for flag in action.option_strings
+    }
+    assert set(synonyms.FLAGS.values()) <= flags
+    assert set(synonyms.COMMANDS.values()) <= {*COMMANDS, "--help", "--version"}
+    assert not set(synonyms.COMMANDS) & set(COMMANDS)

@@ -396,10 +396,11 @@ class TestConfidence:
         assert "0.9997 " in second
         assert "0.9997" not in first
 
-    def test_has_no_column_where_it_is_not_known(self, merged: Callable[..., Any], two: Path) -> None:
+    def test_has_a_dash_where_it_is_not_known(self, merged: Callable[..., Any], two: Path) -> None:
         ran = merged(two)
         assert ran.robots["r2"]["confidence"] is None
-        assert "confidence" not in ran.out
+        header, _, row = ran.out.splitlines()
+        assert row[header.index("confidence") : header.index("reason")].strip() == "–"
 
 
 def test_from_python(matcher: RecordingMatcher, tmp_path: Path) -> None:

@@ -167,5 +167,5 @@ def test_long_names_leave_room_for_figures(monkeypatch: pytest.MonkeyPatch) -> N
     told["robots"] = {"r" * 90: told["robots"]["r2"]}
     lines = table_text(told, "never").splitlines()
     assert "1.3 m²" in lines[1]
-    assert lines[1].split()[:2] == ["r" * 11 + "…", "unmerged"]
+    assert lines[1].startswith("r" * 11 + "… unmerged ")
     assert "".join(lines[3:]).startswith("r" * 90)
