@@ -158,6 +158,8 @@ class OutputOptions:
         Whether the robots' own maps are copied to the MCAP.
     force
         Whether files that exist are replaced.
+    live_url
+        Address of a viewer to which the Rerun recording goes as well; None for none.
     """
 
     mcap: Path
@@ -165,6 +167,7 @@ class OutputOptions:
     every_ns: int = 0
     copy_maps: bool = False
     force: bool = False
+    live_url: str | None = None
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 - any JSON value

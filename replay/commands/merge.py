@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from replay.errors import UsageError
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE, interrupted_late
 from replay.flags import inputs, outputs, placing, rules
 from replay.standard_streams import printing, takes
@@ -52,6 +54,12 @@ def run(options: argparse.Namespace) -> int:
     from replay.outputs import refuse_outputs
 
     refuse_outputs(written, [item.path for item in run.runs])
+    if options.view and options.no_rrd:
+        raise UsageError("--view shows the Rerun recording, which --no-rrd leaves out; give one of them")
+    if options.view:
+        from replay import viewer
+
+        viewer.refuse_without_screen(viewer.INSTEAD_OF_LIVE)
 
     import cv2
 
@@ -67,6 +75,8 @@ def run(options: argparse.Namespace) -> int:
         with open_plan(run) as plan:
             refuse_outputs(written, plan.files())
             narrator.unused_topics = plan.unused_topics()
+            if options.view:
+                written = replace(written, live_url=viewer.open_live())
             with open_sinks(written, (ProgressSink(notes), narrator), say=narrator.say) as sinks:
                 report = drain(events(plan, run), sinks, run.jobs).report
         status = EXIT_DIFFERS if options.require_all and not _all_merged(report) else EXIT_DONE

@@ -24,6 +24,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="the new MCAP, with OUT.rrd and OUT.json beside it (default: NAME.merged.mcap in the current folder)",
     )
     outputs.add_argument("--no-rrd", action="store_true", help="write no Rerun recording")
+    outputs.add_argument(
+        "--view", action="store_true", help="open Rerun's viewer, and show the recording while it is written"
+    )
     outputs.add_argument("--force", action="store_true", help="replace outputs that exist")
     outputs.add_argument(
         "--every",
