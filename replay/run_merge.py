@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 
+from replay.errors import UsageError
 from replay.events import Report
 from replay.options import OutputOptions, RunOptions
 from replay.sinks.base import Sink
@@ -22,14 +24,25 @@ class Run:
         What is written; None for nothing.
     talk, colour
         How much is said, and when in colours: ``auto``, ``always`` or ``never``.
+    is_shown
+        Whether Rerun's viewer is opened, and shows what is written while the run goes on.
     """
 
     def __init__(
-        self, options: RunOptions, written: OutputOptions | None, talk: Talk = Talk.USUAL, colour: str = "auto"
+        self,
+        options: RunOptions,
+        written: OutputOptions | None,
+        talk: Talk = Talk.USUAL,
+        colour: str = "auto",
+        *,
+        is_shown: bool = False,
     ) -> None:
+        if is_shown and (written is None or not written.rrd):
+            raise UsageError("--view shows the Rerun recording, which is not written; leave out --no-rrd, or --view")
         self._options = options
         self._written = written
         self._talk = talk
+        self._is_shown = is_shown
         self._notes = open_notes(colour)
         self.narrator = Narrator(self._notes, announce=options.robots is None, talk=talk)
 
@@ -45,6 +58,10 @@ class Run:
 
         if self._written is not None:
             refuse_outputs(self._written, [item.path for item in self._options.runs])
+        if self._is_shown:
+            from replay import viewer
+
+            viewer.refuse_without_screen(viewer.INSTEAD_OF_LIVE)
 
         import cv2
 
@@ -64,8 +81,13 @@ class Run:
         from replay.sinks import open_sinks
 
         shown = (ProgressSink(self._notes, self._talk), self.narrator)
-        if self._written is not None:
-            with open_sinks(self._written, shown, say=self.narrator.say) as sinks:
+        written = self._written
+        if written is not None and self._is_shown:
+            from replay.viewer import open_live
+
+            written = replace(written, live_url=open_live())
+        if written is not None:
+            with open_sinks(written, shown, say=self.narrator.say) as sinks:
                 yield sinks
             return
         try:

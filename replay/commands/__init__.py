@@ -52,6 +52,7 @@ class CommandModule(Protocol):
 COMMANDS: dict[str, Command] = {
     "merge": Command("replay.commands.merge", "main job", "merge the maps of a recording and write what came of it"),
     "info": Command("replay.commands.info", "main job", "list what recordings hold and what would be merged"),
+    "view": Command("replay.commands.view", "main job", "look at what came of a run, in Rerun's viewer"),
     "recover": Command(
         "replay.commands.recover", "main job", "make a readable MCAP of one that was cut off, such as OUT.mcap.partial"
     ),

@@ -146,7 +146,7 @@ def _merged(options: argparse.Namespace) -> Report:
         options.images = "none"
     run_options = inputs.run_options(options)
     written = outputs.output_options(options, run_options) if is_written else None
-    merging = Run(run_options, written, talk.of(options), options.color)
+    merging = Run(run_options, written, talk.of(options), options.color, is_shown=options.view)
     options.is_published = lambda: written is not None and merging.narrator.is_published
     report = merging.merge()
     paths = output_paths(written).values() if written is not None else ()

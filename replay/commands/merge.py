@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     from replay.run_merge import Run
     from replay.sinks import output_paths
 
-    merging = Run(run, written, talk.of(options), options.color)
+    merging = Run(run, written, talk.of(options), options.color, is_shown=options.view)
     narrator = merging.narrator
     try:
         report = merging.merge()

@@ -30,6 +30,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="write what came of it as one page to look at in a browser, with pictures and plots; it needs no network",
     )
     outputs.add_argument("--no-rrd", action="store_true", help="write no Rerun recording")
+    outputs.add_argument(
+        "--view", action="store_true", help="open Rerun's viewer, and show the recording while it is written"
+    )
     outputs.add_argument("--force", action="store_true", help="replace outputs that exist")
     outputs.add_argument(
         "--every",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import re
 import subprocess
 import sys
 import textwrap
@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
+from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.merger import Merger
 from mapmerge.outcome import Status
@@ -35,9 +35,13 @@ from replay.sinks.rerun_maps import MAX_SIDE_CELLS
 from replay.sinks.rerun_paths import PIECE_POSES
 from replay.sinks.rerun_stream import RrdStream
 from replay.skip_cause import SkipCause
+from replay.viewer import environment, program
+from tests.data_paths import ROOT
 from tests.floors import filled
+from tests.renderer import needs_renderer
+from tests.rrd import contents, rows_of
 from tests.runs import bare_room, flat_map, reference_from
-from tests.viewers import require
+from tests.scenarios import events_of as events_in
 
 ROBOTS = ("r1", "r2", "odd one/ü.3", "r4")
 STRANGER = "odd one/ü.3"
@@ -55,12 +59,15 @@ def strict() -> Iterator[None]:
 
 
 def events_of(
-    robots: Sequence[str], ticks: Mapping[int, Mapping[str, Grid]], skipped: Mapping[int, Skipped] | None = None
+    robots: Sequence[str],
+    ticks: Mapping[int, Mapping[str, Grid]],
+    skipped: Mapping[int, Skipped] | None = None,
+    options: RunOptions = OPTIONS,
 ) -> list[Event]:
     """Return what a run with these maps would yield, as `replay.pipeline.run` does."""
     inputs = tuple(RobotInput(robot, f"/{robot}/map", f"{robot}/map", "header", (0,), 9) for robot in robots)
-    settings = OPTIONS.settings()
-    merger = Merger(robots, OPTIONS.merge)
+    settings = options.settings()
+    merger = Merger(robots, options.merge)
     report, gallery = ReportBuilder(inputs, settings, "9.9"), Gallery("changed", merger.explain)
     found: list[Event] = [Started(inputs, settings, ({"name": "run.mcap"},))]
     for stamp_ns, grids in ticks.items():
@@ -109,7 +116,7 @@ class Entity:
     def __init__(self, path: Path, name: str) -> None:
         batches = [chunk.to_record_batch() for chunk in RrdReader(path).stream() if chunk.entity_path == name]
         assert batches, name
-        rows = [row for batch in batches for row in _rows(batch)]
+        rows = [row for batch in batches for row in rows_of(batch)]
         timed = [row for row in rows if "log_time" in row]
         self.rows = sorted(timed, key=lambda row: row["log_time"]) if timed else rows
 
@@ -120,13 +127,6 @@ class Entity:
     def values(self, component: str) -> list[Any]:
         """Return the only instance of a component in each row, None where the row has not any."""
         return [(row.get(component) or [None])[0] for row in self.rows]
-
-
-def _rows(batch: pa.RecordBatch) -> list[dict[str, Any]]:
-    columns = {name: batch.column(name) for name in batch.schema.names}
-    for timeline in {"log_time", "elapsed"} & set(columns):
-        columns[timeline] = columns[timeline].cast(pa.int64())
-    return [{name: column[index].as_py() for name, column in columns.items()} for index in range(batch.num_rows)]
 
 
 def shades_of(row: Mapping[str, Any]) -> np.ndarray:
@@ -150,12 +150,24 @@ def test_the_entities_are_those_of_the_documented_tree(recording: Path) -> None:
     assert not any("r4" in path for path in found if not path.startswith(("/plots", "/status")))
 
 
+def test_every_entity_is_documented(recording: Path, tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "output-formats.md").read_text(encoding="utf-8")
+    rows = [line for line in text[text.index("## Rerun recording") :].splitlines() if line.startswith("| `/")]
+    named = [name for row in rows for name in re.findall(r"`(/[^`]+)`", row.split("|")[1])]
+    patterns = {name: re.compile(re.sub(r"<\w+>", r"(?:[^/\\\\]|\\\\.)+", name)) for name in named}
+    driven = written(tmp_path / "driven.rrd", events_in("driven"))
+    found = {chunk.entity_path for path in (recording, driven) for chunk in RrdReader(path).stream()}
+    assert {path for path in found if not any(pattern.fullmatch(path) for pattern in patterns.values())} == set()
+    unused = {name for name, pattern in patterns.items() if not any(map(pattern.fullmatch, found))}
+    assert unused == {"/plots/acceptance/limit"}, "the method that is used states a confidence"
+
+
 def test_all_times_are_those_of_the_ticks(recording: Path) -> None:
     stamps: set[int] = set()
     for chunk in RrdReader(recording).stream():
         assert chunk.is_static or set(chunk.timeline_names) == {"log_time", "elapsed", "tick"}
         if not chunk.is_static:
-            stamps |= {row["log_time"] for row in _rows(chunk.to_record_batch())}
+            stamps |= {row["log_time"] for row in rows_of(chunk.to_record_batch())}
     assert stamps == set(STAMPS)
     assert Entity(recording, "/plots/step_ms/merge").stamps == list(STAMPS)
 
@@ -314,7 +326,7 @@ def test_the_blueprint_opens_on_the_end_from_above(recording: Path) -> None:
     reader = RrdReader(recording)
     (store,) = reader.blueprints()
     assert store.application_id == reader.recordings()[0].application_id
-    logged = [row for chunk in reader.stream(store=store) for row in _rows(chunk.to_record_batch())]
+    logged = [row for chunk in reader.stream(store=store) for row in rows_of(chunk.to_record_batch())]
     merged = {name: value for row in logged for name, value in row.items() if value}
     assert merged["TimePanelBlueprint:timeline"] == ["elapsed"]
     assert merged["TimePanelBlueprint:play_state"] == [3]  # following: at the newest data
@@ -332,15 +344,6 @@ def test_two_runs_write_the_same_but_for_the_time_they_took(
     again = written(tmp_path / "again.rrd", slower)
     assert RrdReader(again).recordings()[0].recording_id == RrdReader(recording).recordings()[0].recording_id
     assert contents(again) == contents(recording)
-
-
-def contents(path: Path) -> list[tuple[str, str]]:
-    found = []
-    for chunk in RrdReader(path).stream():
-        if not chunk.entity_path.startswith("/plots/step_ms"):
-            rows = _rows(chunk.to_record_batch())
-            found.append((chunk.entity_path, str([{**row, "rerun.controls.RowId": None} for row in rows])))
-    return sorted(found)
 
 
 # Odd runs
@@ -388,7 +391,7 @@ def test_a_run_without_pictures_has_no_views_for_them(story: list[Event], tmp_pa
     plain = [replace(event, pictures=()) if isinstance(event, Merged) else event for event in story]
     reader = RrdReader(written(tmp_path / "plain.rrd", plain))
     (store,) = reader.blueprints()
-    text = str([_rows(chunk.to_record_batch()) for chunk in reader.stream(store=store)])
+    text = str([rows_of(chunk.to_record_batch()) for chunk in reader.stream(store=store)])
     assert "Spatial3DView" not in text
     assert "'3D'" in text
     assert "'2D'" not in text
@@ -513,28 +516,58 @@ def test_the_name_of_a_map_alone_is_in_its_middle() -> None:
 # The viewer
 
 
-def renderer_missing() -> str | None:
-    """Return why nothing can be drawn here, or None."""
-    if sys.platform != "linux":
-        return None
-    drivers = [Path(folder) / "vulkan" / "icd.d" for folder in ("/usr/share", "/etc", "/usr/local/share")]
-    if os.environ.get("VK_ICD_FILENAMES") or any(any(folder.glob("*.json")) for folder in drivers):
-        return None
-    return "there is no Vulkan driver; a software one is in mesa-vulkan-drivers"
+@pytest.fixture(scope="module")
+def runs(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Runs of all outcomes: one robot of three is not merged, all are, nobody has a map, the paper's method."""
+    folder = tmp_path_factory.mktemp("runs")
+    by_paper = replace(OPTIONS, merge=MergeConfig(method="paper"))
+    ticks = {STAMPS[0]: {"r1": flat_map("r1"), "r2": flat_map("r2")}}
+    return {
+        "partly": recording,
+        "merged": written(folder / "merged.rrd", events_in("driven")),
+        "empty": written(folder / "empty.rrd", events_in("no_map_at_all")),
+        "none": written(folder / "none.rrd", events_of(["r1"], {})),
+        "paper": written(folder / "paper.rrd", events_of(["r1", "r2"], ticks, options=by_paper)),
+    }
 
 
-def test_the_viewer_shows_it_without_complaint(recording: Path, tmp_path: Path) -> None:
-    require(renderer_missing())
-    from scripts.screenshot import complaints, show, show_tab, viewer
+TABS = ("Merged", "Method", "Over time", "Decisions")
 
+
+@pytest.mark.parametrize("name", ["partly", "merged", "empty", "none", "paper"])
+def test_the_viewer_shows_every_tab_at_every_time_without_complaint(
+    runs: dict[str, Path], name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    needs_renderer()
+    from scripts import screenshot
+    from scripts.screenshot import complaints, seek, show, show_tab, tabs, viewer
+
+    monkeypatch.setattr(screenshot, "SETTLE_S", 0.5)  # long enough for views to report
     shown: set[str] = set()
     with viewer("1000x700") as client:
-        for time_fraction in (None, 0.0, 0.5):
-            show(client, recording, time_fraction)
-            for tab in ("Merged", "Method", "Over time", "Decisions"):
+        show(client, runs[name])
+        assert tabs(client) == [tab for tab in TABS if tab != "Method" or name not in ("empty", "none")]
+        for time_fraction in (1.0, 0.0, 0.5):
+            seek(client, time_fraction)
+            for tab in tabs(client):
                 show_tab(client, tab)
                 assert complaints(client) == []
                 shown |= {view.name for view in client.get_state().views if view.visible}
         client.save_screenshot(str(tmp_path / "shot.png"))
-    assert {"Maps", "Outcome", "Overlay", "Candidates", "Acceptance index", "Robots", "Skipped"} <= shown
+    assert {"Maps", "Outcome", "Acceptance index", "Placed at yaw, °", "Robots", "Skipped"} <= shown
+    assert ("Candidates" in shown) == (name not in ("empty", "none"))
+    assert ("Interest points" in shown) == (name == "paper")
     assert (tmp_path / "shot.png").stat().st_size > 10_000
+
+
+def test_the_library_finds_no_difference_between_two_runs(runs: dict[str, Path], tmp_path: Path) -> None:
+    """Of a run in which nobody was withdrawn: the library holds gaps in lines to differ from themselves."""
+    again = written(tmp_path / "again.rrd", events_in("driven"))
+    done = subprocess.run(
+        [str(program()), "rrd", "compare", "--unordered", str(runs["merged"]), str(again)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env=environment(),
+    )
+    assert done.returncode == 0, done.stderr
