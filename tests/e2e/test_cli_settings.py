@@ -201,7 +201,7 @@ def test_the_example_of_the_documents_is_a_file_of_settings(replay: Program, tmp
     example = page.partition("```toml\n")[2].partition("```")[0]
     found = tomllib.loads(replay("config", "--config", written(tmp_path, example)).out)
     assert found["merge"]["verify"]["min_overlap_m2"] == 10.0
-    assert found["outputs"]["output"] == str(tmp_path / "out/floor.mcap")
+    assert found["outputs"]["output"] == str(tmp_path / "floor.mcap")
 
 
 def test_recordings_may_stand_between_flags(replay: Program) -> None:
