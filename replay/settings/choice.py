@@ -84,7 +84,8 @@ def _as_flag(action: argparse.Action, said: Said) -> object:
         texts = _texts(said)
         if action.dest == "runs":
             return [_placed(text, said.folder) for text in texts]
-        return ",".join(texts) if action.dest in _WITH_COMMAS else texts
+        # no names are all of them
+        return (",".join(texts) or None) if action.dest in _WITH_COMMAS else texts
     text = _text(said)
     if action.type is Path:
         return said.folder / text

@@ -87,7 +87,7 @@ def _document(path: Path) -> Mapping[str, Any]:
         what = "there is no such file" if isinstance(error, FileNotFoundError) else error.strerror
         raise UsageError(f"{path}: {what}; expected settings, as `replay config` prints them") from error
     try:
-        return tomllib.loads(data.decode(), parse_float=Decimal)
+        return tomllib.loads(data.decode("utf-8-sig"), parse_float=Decimal)
     except UnicodeDecodeError as error:
         raise UsageError(f"{path}: is no text in UTF-8; expected settings in TOML") from error
     except tomllib.TOMLDecodeError as error:

@@ -119,7 +119,7 @@ def _mark(item: Shown) -> str:
     if not item.is_changed:
         return "default"
     there = (
-        "there is no default" if item.default is None else f"the default is {tomlkit.item(item.default).as_string()}"
+        "by default it is not" if item.default is None else f"the default is {tomlkit.item(item.default).as_string()}"
     )
     return f"set; {there}"
 

@@ -89,6 +89,23 @@ def test_flags_win_and_replace_lists(replay: Program, tmp_path: Path) -> None:
     assert found["time"]["stop"] == 9
 
 
+def test_all_defaults_are_the_run_without_a_file(replay: Program, tmp_path: Path) -> None:
+    config = tmp_path / "replay.toml"
+    config.write_text("\ufeff" + replay("config").out, encoding="utf-8")  # as some editors begin files
+    outputs = ("-o", tmp_path / "out.mcap", "--no-rrd", "--force", "--stop", "100")
+    digests = set()
+    for flags in ((), ("--config", config)):
+        ran = replay("merge", SAMPLE, *outputs, *flags)
+        assert ran.status == 0, ran.err
+        digests.add((ran.mcap.read_bytes(), ran.report_path.read_bytes()))
+    assert len(digests) == 1
+
+
+def test_robots_of_a_file_can_be_all_again(replay: Program, tmp_path: Path) -> None:
+    config = written(tmp_path, 'robots = ["r2", "r1"]\n')
+    assert "robots" not in tomllib.loads(replay("config", "--config", config, "--set", "robots=[]").out)
+
+
 def test_a_switch_of_a_file_can_be_switched_off(replay: Program, tmp_path: Path) -> None:
     config = written(tmp_path, "[rules]\nstrict = true\n")
     said = replay("config", "--config", config, "--set", "rules.strict=false").out
@@ -184,7 +201,7 @@ def test_the_example_of_the_documents_is_a_file_of_settings(replay: Program, tmp
     example = page.partition("```toml\n")[2].partition("```")[0]
     found = tomllib.loads(replay("config", "--config", written(tmp_path, example)).out)
     assert found["merge"]["verify"]["min_overlap_m2"] == 10.0
-    assert found["outputs"]["output"] == str(tmp_path / "out/floor.mcap")
+    assert found["outputs"]["output"] == str(tmp_path / "floor.mcap")
 
 
 def test_recordings_may_stand_between_flags(replay: Program) -> None:
