@@ -161,6 +161,8 @@ class OutputOptions:
         Whether the robots' own maps are copied to the MCAP.
     force
         Whether files that exist are replaced.
+    live_url
+        Address of a viewer to which the Rerun recording goes as well; None for none.
     """
 
     mcap: Path
@@ -169,6 +171,7 @@ class OutputOptions:
     every_ns: int = 0
     copy_maps: bool = False
     force: bool = False
+    live_url: str | None = None
 
     def settings(self, images: ImageChoice) -> Mapping[str, Any]:
         """Return the settings that decide what an MCAP holds, as written to reports."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 
 from replay.events import Report
 from replay.options import OutputOptions, RunOptions
@@ -22,11 +23,20 @@ class Run:
         What is written; None for nothing.
     talk, colour
         How much is said, and when in colours: ``auto``, ``always`` or ``never``.
+    view
+        Whether Rerun's viewer is opened, and shows what is written meanwhile.
     """
 
     def __init__(
-        self, options: RunOptions, written: OutputOptions | None, talk: Talk = Talk.USUAL, colour: str = "auto"
+        self,
+        options: RunOptions,
+        written: OutputOptions | None,
+        talk: Talk = Talk.USUAL,
+        colour: str = "auto",
+        *,
+        view: bool = False,
     ) -> None:
+        self._view = view
         self._options = options
         self._written = written
         self._talk = talk
@@ -45,6 +55,10 @@ class Run:
 
         if self._written is not None:
             refuse_outputs(self._written, [item.path for item in self._options.runs])
+        if self._view:
+            from replay import viewer
+
+            viewer.refuse_without_screen(viewer.INSTEAD_OF_LIVE)
 
         import cv2
 
@@ -56,6 +70,8 @@ class Run:
             if self._written is not None:
                 refuse_outputs(self._written, plan.files())
             self.narrator.unused_topics = plan.unused_topics()
+            if self._view and self._written is not None:
+                self._written = replace(self._written, live_url=viewer.open_live())
             with self._sinks() as sinks:
                 return drain(events(plan, self._options, self._written), sinks, self._options.jobs).report
 

@@ -9,7 +9,6 @@ Where there is no graphics card, a software renderer is needed, on Debian and Ub
 from __future__ import annotations
 
 import argparse
-import os
 import socket
 import subprocess
 import sys
@@ -20,8 +19,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-import rerun_cli
 from rerun.experimental import ViewerClient
+
+from replay.viewer import environment, live_address, program
 
 TIMELINE = "log_time"
 _START_S = 30.0
@@ -38,15 +38,13 @@ def viewer(size: str = "1400x900") -> Iterator[ViewerClient]:
     RuntimeError
         If it does not start, which is so where nothing can render.
     """
-    # The `rerun` command is a wrapper whose child outlives it: the program itself is run.
-    program = Path(str(rerun_cli.__file__)).with_name("rerun.exe" if os.name == "nt" else "rerun")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     options = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", size]
     with tempfile.TemporaryDirectory() as scratch, (Path(scratch) / "log").open("w+b") as log:
         process = subprocess.Popen(
-            [str(program), *options], stdout=log, stderr=subprocess.STDOUT, env=private_environment(scratch)
+            [str(program()), *options], stdout=log, stderr=subprocess.STDOUT, env=private_environment(scratch)
         )
         try:
             yield _connected(process, port, Path(log.name))
@@ -56,18 +54,9 @@ def viewer(size: str = "1400x900") -> Iterator[ViewerClient]:
 
 
 def private_environment(scratch: str) -> dict[str, str]:
-    """Return the environment in which the viewer tells nobody that it runs, and leaves nothing behind.
-
-    By itself it sends usage data, asks whether there is a newer release of it, and keeps settings in the home folder.
-    """
-    nobody = "http://127.0.0.1:9"  # no flag switches the question for a release off; nothing listens there
-    return {
-        **os.environ,
-        "CI": "1",  # no usage data
-        "HTTPS_PROXY": nobody,
-        "https_proxy": nobody,
-        **dict.fromkeys(("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "XDG_RUNTIME_DIR"), scratch),
-    }
+    """Return the environment in which the viewer tells nobody that it runs, and leaves nothing behind."""
+    folders = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "XDG_RUNTIME_DIR")
+    return {**environment(), **dict.fromkeys(folders, scratch)}
 
 
 def show(client: ViewerClient, recording: Path, time_fraction: float | None = None) -> None:
@@ -158,7 +147,7 @@ def _connected(process: subprocess.Popen[bytes], port: int, log: Path) -> Viewer
     deadline = time.monotonic() + _START_S
     while process.poll() is None and time.monotonic() < deadline:
         try:
-            client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+            client = ViewerClient.connect(live_address(port))
             client.get_state()
         except Exception:  # noqa: BLE001 - whatever the library says while nobody listens yet
             time.sleep(0.1)

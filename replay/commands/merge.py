@@ -6,6 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
+from replay.errors import UsageError
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE, interrupted_late
 from replay.flags import inputs, outputs, placing, rules, talk
 from replay.standard_streams import printing, takes
@@ -37,6 +38,9 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     inputs.add(parser)
     placing.add(parser)
     outputs.add(parser)
+    parser.add_argument(
+        "--view", action="store_true", help="open Rerun's viewer, and show the Rerun recording while it is written"
+    )
     rules.add_all(parser)
     talk.add(parser)
 
@@ -49,7 +53,9 @@ def run(options: argparse.Namespace) -> int:
     from replay.run_merge import Run
     from replay.sinks import output_paths
 
-    merging = Run(run, written, talk.of(options), options.color)
+    if options.view and options.no_rrd:
+        raise UsageError("--view shows the Rerun recording, which --no-rrd leaves out; give one of them")
+    merging = Run(run, written, talk.of(options), options.color, view=options.view)
     narrator = merging.narrator
     try:
         report = merging.merge()

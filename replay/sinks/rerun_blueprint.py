@@ -127,7 +127,8 @@ def _time_axis(span_ns: int, more: float) -> rrb.TimeAxis | None:
 
 def _decisions() -> Part:
     # The column of times is too narrow for a time, and is in its own units: entries begin with theirs.
-    columns = rrb.TextLogColumns(timeline_columns=[], text_log_columns=["LogLevel", "Body"])
+    hidden = [rrb.encodings.TimelineColumn(ELAPSED, visible=False)]
+    columns = rrb.TextLogColumns(timeline_columns=hidden, text_log_columns=["LogLevel", "Body"])
     return rrb.Vertical(
         rrb.TextLogView(name="What was decided, and why", origin=_path(DECISIONS), columns=columns),
         rrb.Horizontal(
@@ -136,7 +137,7 @@ def _decisions() -> Part:
             rrb.TextDocumentView(name="Inputs and settings", origin=_path(ABOUT)),
             column_shares=[5, 4, 4],
         ),
-        row_shares=[1, 1],
+        row_shares=[2, 3],
         name="Decisions",
     )
 

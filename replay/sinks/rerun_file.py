@@ -8,6 +8,7 @@ from dataclasses import asdict
 from uuid import NAMESPACE_URL, UUID, uuid5
 
 import rerun as rr
+from rerun.blueprint import Blueprint
 
 from mapmerge.config import CellConfig
 from mapmerge.match import CALIBRATED
@@ -22,12 +23,13 @@ from replay.sinks.rerun_blueprint import blueprint
 from replay.sinks.rerun_candidates import candidates
 from replay.sinks.rerun_entities import ABOUT, DECISIONS, LEGEND, ROBOTS, SKIPPED, SUMMARY, EntityPath, RobotEntities
 from replay.sinks.rerun_errors import rerun_errors
+from replay.sinks.rerun_live import LiveStream
 from replay.sinks.rerun_maps import MapScene
 from replay.sinks.rerun_overlap import OverlapScene
 from replay.sinks.rerun_paths import PathScene
 from replay.sinks.rerun_plots import Plots
 from replay.sinks.rerun_status import Statuses
-from replay.sinks.rerun_stream import RrdStream
+from replay.sinks.rerun_stream import APPLICATION, RrdStream
 from replay.sinks.rerun_summary import LEGEND as LEGEND_TEXT
 from replay.sinks.rerun_summary import Said, summary
 
@@ -37,8 +39,9 @@ _MARKDOWN = rr.MediaType.MARKDOWN
 class RerunSink:
     """Writes the maps, pictures, numbers and decisions of a run, and what the viewer shows of them."""
 
-    def __init__(self, file: PartialFile, _options: OutputOptions) -> None:
+    def __init__(self, file: PartialFile, options: OutputOptions) -> None:
         self._file = file
+        self._live_url = options.live_url
         self._stream: RrdStream | None = None
         self._writer: _Writer | None = None
 
@@ -46,7 +49,9 @@ class RerunSink:
         """Log what happened; the library writes it to the file in the meantime."""
         with rerun_errors(self._file.path):
             if isinstance(event, Started):
-                self._stream = RrdStream(self._file, _recording_id(event))
+                number = _recording_id(event)
+                live = None if self._live_url is None else LiveStream(self._live_url, APPLICATION, number)
+                self._stream = RrdStream(self._file, number, live)
                 self._writer = _Writer(self._stream, event)
             elif self._writer is not None:
                 self._writer.take(event)
@@ -91,6 +96,7 @@ class _Writer:
         self._pages: dict[tuple[str, ...], str] = {}
         self._start_ns: int | None = None
         self._stamp_ns = 0
+        self._laid_out = (-1, False)
         self.stream.log(LEGEND, rr.TextDocument(LEGEND_TEXT, media_type=_MARKDOWN), static=True)
 
     def take(self, event: Event) -> None:
@@ -108,9 +114,18 @@ class _Writer:
 
     def finish(self) -> None:
         """Write the layout of the viewer and all that makes the file whole."""
-        robots = list(self._robots.values())
-        self.stream.send(blueprint(robots, self._steps, self._maps.extent, self._since_ns))
+        self.stream.send(self._layout(self._since_ns))
         self.stream.finish()
+
+    def _layout(self, span_ns: int) -> Blueprint:
+        return blueprint(list(self._robots.values()), self._steps, self._maps.extent, span_ns)
+
+    def _lay_out_live(self) -> None:
+        """Lay the viewer out where there is something new to lay out: that sets back what a person chose."""
+        seen = sum(map(len, self._steps.values())), self._maps.extent is not None
+        if self.stream.is_live and seen != self._laid_out:
+            self._laid_out = seen
+            self.stream.send(self._layout(0), live_only=True)
 
     @property
     def _since_ns(self) -> int:
@@ -133,6 +148,7 @@ class _Writer:
         for entry in decisions(event.result):
             self._say(entry)
         self._show_pages(event.report)
+        self._lay_out_live()
 
     def _take_finished(self, event: Finished) -> None:
         self._say_waiting()
@@ -172,7 +188,7 @@ class _Writer:
 
     def _say(self, entry: Entry) -> None:
         level, words = entry[0], plain(entry[1])
-        said = Said(self._since_ns / NS_PER_S, level, words)
+        said = Said(self._since_ns / NS_PER_S, words)
         self._said.append(said)
         line = words if self._start_ns is None else f"{said.since}  {words}"
         self.stream.log(DECISIONS, rr.TextLog(line, level=level), static=self._start_ns is None)

@@ -15,6 +15,7 @@ import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
 from replay.sinks.partial_file import PartialFile
+from replay.sinks.rerun_live import LiveStream
 from replay.sinks.rerun_outlet import outlet_to
 
 APPLICATION = "replay"
@@ -46,6 +47,8 @@ class RrdStream:
         The file.
     recording_id
         The same for the same input, so that two runs can be compared.
+    live
+        Takes the same for a viewer that is open meanwhile; None for no viewer.
 
     Raises
     ------
@@ -53,8 +56,9 @@ class RrdStream:
         If the file cannot be opened.
     """
 
-    def __init__(self, file: PartialFile, recording_id: UUID) -> None:
+    def __init__(self, file: PartialFile, recording_id: UUID, live: LiveStream | None = None) -> None:
         self._file = file
+        self._live = live
         # Rows go to chunks by their size and never by the clock, so that two runs have the same chunks. Of each chunk
         # something is kept until the end, so small rows share one.
         batching = rr.ChunkBatcherConfig(_NEVER, _CHUNK_BYTES, _NO_LIMIT)
@@ -79,9 +83,10 @@ class RrdStream:
     def at(self, stamp_ns: int) -> None:
         """Set the time of what is logged from now on."""
         self._start_ns = stamp_ns if self._start_ns is None else self._start_ns
-        self._recording.set_time(TIMELINE, timestamp=np.datetime64(stamp_ns, "ns"))
-        self._recording.set_time(ELAPSED, duration=np.timedelta64(stamp_ns - self._start_ns, "ns"))
-        self._recording.set_time(TICKS, sequence=self._ticks)
+        since_ns, ticks = stamp_ns - self._start_ns, self._ticks
+        _set_times(self._recording, stamp_ns, since_ns, ticks)
+        if self._live is not None:
+            self._live.do(lambda recording: _set_times(recording, stamp_ns, since_ns, ticks))
         self._ticks += 1
 
     def log(self, path: Sequence[str], *content: rr.AsComponents, static: bool = False) -> None:
@@ -101,10 +106,20 @@ class RrdStream:
             self.flush()
         self._waiting_bytes += size_bytes
         self._recording.log(list(path), batches, static=static)
+        if self._live is not None:
+            self._live.log(path, batches, static=static)
 
-    def send(self, blueprint: rrb.Blueprint) -> None:
-        """Add what the viewer shows when the file is opened."""
-        self._recording.send_blueprint(blueprint, make_active=True, make_default=True)
+    @property
+    def is_live(self) -> bool:
+        """Whether somebody looks on."""
+        return self._live is not None
+
+    def send(self, blueprint: rrb.Blueprint, *, live_only: bool = False) -> None:
+        """Add what the viewer shows when the file is opened; or only show it to who looks on."""
+        if not live_only:
+            self._recording.send_blueprint(blueprint, make_active=True, make_default=True)
+        if self._live is not None:
+            self._live.send(blueprint)
 
     def flush(self) -> None:
         """Wait until all that was logged is on its way to the file.
@@ -152,6 +167,9 @@ class RrdStream:
 
     def close(self) -> None:
         """Release the file as it is; harmless at any time."""
+        if self._live is not None:
+            self._live.close()
+            self._live = None
         if not self._broken:
             self._recording.disconnect()
             self._outlet.close()
@@ -161,6 +179,12 @@ class RrdStream:
         self._broken = True
         rr.unregister_shutdown()
         Thread(target=self._recording.disconnect, daemon=True).start()
+
+
+def _set_times(recording: rr.RecordingStream, stamp_ns: int, since_ns: int, ticks: int) -> None:
+    recording.set_time(TIMELINE, timestamp=np.datetime64(stamp_ns, "ns"))
+    recording.set_time(ELAPSED, duration=np.timedelta64(since_ns, "ns"))
+    recording.set_time(TICKS, sequence=ticks)
 
 
 @contextmanager

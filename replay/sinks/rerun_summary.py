@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from replay.decisions import WARN
 from replay.events import Report
 from replay.sinks.rerun_entities import RobotEntities
 from replay.sinks.rerun_text import cell, paragraph
@@ -30,7 +29,6 @@ class Said:
     """An entry of the log, and how long after the first tick it was said."""
 
     since_s: float
-    level: str
     words: str
 
     @property
@@ -67,7 +65,9 @@ def _headline(report: Report) -> str:
     merged = sum(values["merged_from_map"] is not None for values in robots)
     if merged == len(robots) > 1:
         return f"All {merged} robots are merged"
-    return f"{merged} of {counted(len(robots), 'robot')} {'is' if merged == 1 else 'are'} in the merged map"
+    if len(robots) == 1:
+        return "There is only one robot"
+    return f"{merged} of {len(robots)} robots are merged" if merged > 1 else "No maps are merged"
 
 
 def _table(report: Report, robots: Sequence[RobotEntities]) -> str:
@@ -121,8 +121,7 @@ def _lately(said: Sequence[Said]) -> Iterator[str]:
     if len(said) > _MOST_SAID:
         yield f"*{len(said) - _MOST_SAID} earlier ones: see* Decisions"
     for item in said[-_MOST_SAID:]:
-        words = paragraph(item.words)
-        yield f"**{item.since}** {'! ' if item.level == WARN else ''}{words}"
+        yield f"**{item.since}** {paragraph(item.words)}"
 
 
 def _items(items: Sequence[str] | Iterator[str], otherwise: str) -> list[str]:

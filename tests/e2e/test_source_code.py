@@ -25,6 +25,8 @@ METHODS = {
     *("yaml.load", "yaml.unsafe_load", "yaml.full_load", "np.fromregex", "np.memmap", "torch.load"),
     *("tarfile.open", "shutil.unpack_archive", "zipfile.ZipFile"),
 }
+# The viewer of the Rerun library is a program of its own, which is started when it is asked for, with paths of files.
+ALLOWED = {"replay/viewer.py": {"socket", "subprocess"}}
 
 
 def offences(text: str) -> list[str]:
@@ -69,7 +71,8 @@ def _is(given: dict[str | None, ast.expr], name: str, value: object) -> bool:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_nothing_of_an_input_is_run(path: Path) -> None:
-    assert offences(path.read_text(encoding="utf-8")) == []
+    found = {offence.rpartition(": ")[2] for offence in offences(path.read_text(encoding="utf-8"))}
+    assert found == ALLOWED.get(path.relative_to(ROOT).as_posix(), set())
 
 
 def test_there_is_code_to_look_at() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import textwrap
@@ -12,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
@@ -36,8 +34,9 @@ from replay.sinks.rerun_paths import PIECE_POSES
 from replay.sinks.rerun_stream import RrdStream
 from replay.skip_cause import SkipCause
 from tests.floors import filled
+from tests.renderer import needs_renderer
+from tests.rrd import contents, rows_of
 from tests.runs import bare_room, flat_map, reference_from
-from tests.viewers import require
 
 ROBOTS = ("r1", "r2", "odd one/ü.3", "r4")
 STRANGER = "odd one/ü.3"
@@ -109,7 +108,7 @@ class Entity:
     def __init__(self, path: Path, name: str) -> None:
         batches = [chunk.to_record_batch() for chunk in RrdReader(path).stream() if chunk.entity_path == name]
         assert batches, name
-        rows = [row for batch in batches for row in _rows(batch)]
+        rows = [row for batch in batches for row in rows_of(batch)]
         timed = [row for row in rows if "log_time" in row]
         self.rows = sorted(timed, key=lambda row: row["log_time"]) if timed else rows
 
@@ -120,13 +119,6 @@ class Entity:
     def values(self, component: str) -> list[Any]:
         """Return the only instance of a component in each row, None where the row has not any."""
         return [(row.get(component) or [None])[0] for row in self.rows]
-
-
-def _rows(batch: pa.RecordBatch) -> list[dict[str, Any]]:
-    columns = {name: batch.column(name) for name in batch.schema.names}
-    for timeline in {"log_time", "elapsed"} & set(columns):
-        columns[timeline] = columns[timeline].cast(pa.int64())
-    return [{name: column[index].as_py() for name, column in columns.items()} for index in range(batch.num_rows)]
 
 
 def shades_of(row: Mapping[str, Any]) -> np.ndarray:
@@ -155,7 +147,7 @@ def test_all_times_are_those_of_the_ticks(recording: Path) -> None:
     for chunk in RrdReader(recording).stream():
         assert chunk.is_static or set(chunk.timeline_names) == {"log_time", "elapsed", "tick"}
         if not chunk.is_static:
-            stamps |= {row["log_time"] for row in _rows(chunk.to_record_batch())}
+            stamps |= {row["log_time"] for row in rows_of(chunk.to_record_batch())}
     assert stamps == set(STAMPS)
     assert Entity(recording, "/plots/step_ms/merge").stamps == list(STAMPS)
 
@@ -314,7 +306,7 @@ def test_the_blueprint_opens_on_the_end_from_above(recording: Path) -> None:
     reader = RrdReader(recording)
     (store,) = reader.blueprints()
     assert store.application_id == reader.recordings()[0].application_id
-    logged = [row for chunk in reader.stream(store=store) for row in _rows(chunk.to_record_batch())]
+    logged = [row for chunk in reader.stream(store=store) for row in rows_of(chunk.to_record_batch())]
     merged = {name: value for row in logged for name, value in row.items() if value}
     assert merged["TimePanelBlueprint:timeline"] == ["elapsed"]
     assert merged["TimePanelBlueprint:play_state"] == [3]  # following: at the newest data
@@ -332,15 +324,6 @@ def test_two_runs_write_the_same_but_for_the_time_they_took(
     again = written(tmp_path / "again.rrd", slower)
     assert RrdReader(again).recordings()[0].recording_id == RrdReader(recording).recordings()[0].recording_id
     assert contents(again) == contents(recording)
-
-
-def contents(path: Path) -> list[tuple[str, str]]:
-    found = []
-    for chunk in RrdReader(path).stream():
-        if not chunk.entity_path.startswith("/plots/step_ms"):
-            rows = _rows(chunk.to_record_batch())
-            found.append((chunk.entity_path, str([{**row, "rerun.controls.RowId": None} for row in rows])))
-    return sorted(found)
 
 
 # Odd runs
@@ -388,7 +371,7 @@ def test_a_run_without_pictures_has_no_views_for_them(story: list[Event], tmp_pa
     plain = [replace(event, pictures=()) if isinstance(event, Merged) else event for event in story]
     reader = RrdReader(written(tmp_path / "plain.rrd", plain))
     (store,) = reader.blueprints()
-    text = str([_rows(chunk.to_record_batch()) for chunk in reader.stream(store=store)])
+    text = str([rows_of(chunk.to_record_batch()) for chunk in reader.stream(store=store)])
     assert "Spatial3DView" not in text
     assert "'3D'" in text
     assert "'2D'" not in text
@@ -513,18 +496,8 @@ def test_the_name_of_a_map_alone_is_in_its_middle() -> None:
 # The viewer
 
 
-def renderer_missing() -> str | None:
-    """Return why nothing can be drawn here, or None."""
-    if sys.platform != "linux":
-        return None
-    drivers = [Path(folder) / "vulkan" / "icd.d" for folder in ("/usr/share", "/etc", "/usr/local/share")]
-    if os.environ.get("VK_ICD_FILENAMES") or any(any(folder.glob("*.json")) for folder in drivers):
-        return None
-    return "there is no Vulkan driver; a software one is in mesa-vulkan-drivers"
-
-
 def test_the_viewer_shows_it_without_complaint(recording: Path, tmp_path: Path) -> None:
-    require(renderer_missing())
+    needs_renderer()
     from scripts.screenshot import complaints, show, show_tab, viewer
 
     shown: set[str] = set()
