@@ -1,6 +1,7 @@
 """Take a picture of what the Rerun viewer shows of a recording, without a screen.
 
-    python scripts/screenshot.py RUN.rrd OUT.png [--time-fraction 0.5] [--size 1400x900]
+    python scripts/screenshot.py RUN.rrd OUT.png [--tab Method] [--at 0.5] [--size 1400x900]
+    python scripts/screenshot.py RUN.rrd 'RUN_{}.png' --at 0 --at 0.5 --at 1
 
 Where there is no graphics card, a software renderer is needed, on Debian and Ubuntu:
 ``apt-get install --no-install-recommends mesa-vulkan-drivers libvulkan1``.
@@ -14,19 +15,24 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from io import BytesIO
+from itertools import product
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 from rerun.experimental import ViewerClient
 
+from replay.sinks.rerun_stream import ELAPSED
 from replay.viewer import environment, live_address, program
 
-TIMELINE = "log_time"
 _START_S = 30.0
 _NOTICES_S = 5.0
-_SETTLE_S = 1.5
+SETTLE_S = 1.5
+"""How long it takes to draw what is shown anew."""
+_COLOURS = 256
 
 
 @contextmanager
@@ -59,23 +65,30 @@ def private_environment(scratch: str) -> dict[str, str]:
     return {**environment(), **dict.fromkeys(folders, scratch)}
 
 
-def show(client: ViewerClient, recording: Path, time_fraction: float | None = None) -> None:
-    """Open a recording and wait until all of it is there.
-
-    Parameters
-    ----------
-    time_fraction
-        Which time is shown, from 0 (the start) to 1 (the end); None for what the recording opens on.
-    """
+def show(client: ViewerClient, recording: Path) -> None:
+    """Open a recording and wait until all of it is there."""
     client.open(str(recording.resolve()))
     while (state := client.get_state()).loading or not state.recordings:
         time.sleep(0.1)
-    if time_fraction is not None:
-        timeline = next(item for item in state.recordings[0].timelines if item.name == TIMELINE)
-        if timeline.start is not None and timeline.end is not None:
-            stamp_ns = timeline.start + int((timeline.end - timeline.start) * time_fraction)
-            client.set_time(TIMELINE, timestamp=_timestamp(stamp_ns), play_state="paused")
-    time.sleep(_SETTLE_S)
+    time.sleep(SETTLE_S)
+
+
+def seek(client: ViewerClient, time_fraction: float) -> None:
+    """Show the state at a time, from 0 (the start) to 1 (the end)."""
+    timelines = client.get_state().recordings[0].timelines
+    timeline = next((item for item in timelines if item.name == ELAPSED), None)
+    if timeline is not None and timeline.start is not None and timeline.end is not None:
+        since_ns = timeline.start + int((timeline.end - timeline.start) * time_fraction)
+        client.set_time(ELAPSED, duration=np.timedelta64(since_ns, "ns"), play_state="paused")
+        time.sleep(SETTLE_S)
+
+
+def tabs(client: ViewerClient) -> list[str]:
+    """Return the names of the outermost tabs."""
+    layout = client.get_blueprint().blueprint
+    held = {child for parts in layout.values() for child in _contents(parts)}
+    root = next(path for path, parts in layout.items() if "ContainerBlueprint" in parts and path not in held)
+    return [str(layout[child]["ContainerBlueprint"]["display_name"]) for child in _contents(layout[root])]
 
 
 def show_tab(client: ViewerClient, name: str) -> None:
@@ -99,7 +112,7 @@ def show_tab(client: ViewerClient, name: str) -> None:
                 container["active_tab"] = path
             path = parents[path]  # noqa: PLW2901
         client.set_blueprint(layout, store_id=found.store_id)
-        time.sleep(_SETTLE_S)
+        time.sleep(SETTLE_S)
         return
     raise LookupError(f"there is no tab {name!r}")
 
@@ -121,26 +134,47 @@ def complaints(client: ViewerClient) -> list[str]:
 
 
 def main() -> int:
-    """Take the picture that the command line asks for."""
+    """Take the pictures that the command line asks for."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("recording", type=Path, metavar="RUN.rrd")
-    parser.add_argument("picture", type=Path, metavar="OUT.png")
-    parser.add_argument("--time-fraction", type=float, help="0 for the start to 1 for the end; default: as it opens")
-    parser.add_argument("--tab", help="which tab is shown (default: the one that it opens on)")
+    parser.add_argument("picture", type=Path, metavar="OUT.png", help="{} in its name stands for the time, or the tab")
+    parser.add_argument("--at", type=float, action="append", help="0 for the start to 1 for the end; may be repeated")
+    parser.add_argument("--tab", action="append", help="which tab is shown; may be repeated (default: as it opens)")
     parser.add_argument("--size", default="1400x900", help="of the window (default: %(default)s)")
     arguments = parser.parse_args()
     if not arguments.recording.is_file():
         parser.error(f"{arguments.recording}: there is no such file")
-    with viewer(arguments.size) as client:
-        show(client, arguments.recording, arguments.time_fraction)
-        if arguments.tab:
-            show_tab(client, arguments.tab)
-        time.sleep(_NOTICES_S)  # until the viewer's own notices are gone
-        client.save_screenshot(str(arguments.picture.resolve()))
-        found = complaints(client)
+    found = taken(
+        arguments.recording, arguments.picture, arguments.at or [None], arguments.tab or [None], arguments.size
+    )
     for complaint in found:
         print(complaint, file=sys.stderr)
     return 1 if found else 0
+
+
+def taken(
+    recording: Path, picture: Path, times: Sequence[float | None], names: Sequence[str | None], size: str
+) -> list[str]:
+    """Take a picture of each tab at each time, and return what views complain of."""
+    found: list[str] = []
+    with viewer(size) as client:
+        show(client, recording)
+        time.sleep(_NOTICES_S)  # until the viewer's own notices are gone
+        for name, at in product(names, times):
+            if at is not None:
+                seek(client, at)
+            if name is not None:
+                show_tab(client, name)
+            of = ["" if name is None else name.lower().replace(" ", "_"), "" if at is None else f"{100 * at:03.0f}"]
+            save(client, picture.with_name(picture.name.replace("{}", "_".join(filter(None, of)))))
+            found += complaints(client)
+    return found
+
+
+def save(client: ViewerClient, path: Path) -> None:
+    """Save what is shown in as many colours as it needs: the file is half as large as with all."""
+    image = Image.open(BytesIO(client.take_screenshot())).convert("RGB")
+    image.quantize(_COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 def _connected(process: subprocess.Popen[bytes], port: int, log: Path) -> ViewerClient:
@@ -154,10 +188,6 @@ def _connected(process: subprocess.Popen[bytes], port: int, log: Path) -> Viewer
         else:
             return client
     raise RuntimeError(f"the viewer does not start: {log.read_text(errors='replace')[-2000:]}")
-
-
-def _timestamp(stamp_ns: int) -> np.datetime64:
-    return np.datetime64(stamp_ns, "ns")
 
 
 if __name__ == "__main__":

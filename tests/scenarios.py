@@ -99,6 +99,7 @@ SCENARIOS: dict[str, Scenario] = {
             [linked(0.5 * index, link("map", "r1/base_link", Sim2(0.2 * index, 1.0))) for index in range(50)],
         ),
         lambda last: [item.robot for item in last.moved] == ["r1"],
+        images="changed",
         trajectories="all",
     ),
     "one_robot": Scenario(lambda: growing("r1"), lambda last: _statuses(last) == ["reference"], images="changed"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import textwrap
@@ -15,6 +16,7 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
+from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.merger import Merger
 from mapmerge.outcome import Status
@@ -33,10 +35,13 @@ from replay.sinks.rerun_maps import MAX_SIDE_CELLS
 from replay.sinks.rerun_paths import PIECE_POSES
 from replay.sinks.rerun_stream import RrdStream
 from replay.skip_cause import SkipCause
+from replay.viewer import environment, program
+from tests.data_paths import ROOT
 from tests.floors import filled
 from tests.renderer import needs_renderer
 from tests.rrd import contents, rows_of
 from tests.runs import bare_room, flat_map, reference_from
+from tests.scenarios import events_of as events_in
 
 ROBOTS = ("r1", "r2", "odd one/ü.3", "r4")
 STRANGER = "odd one/ü.3"
@@ -54,12 +59,15 @@ def strict() -> Iterator[None]:
 
 
 def events_of(
-    robots: Sequence[str], ticks: Mapping[int, Mapping[str, Grid]], skipped: Mapping[int, Skipped] | None = None
+    robots: Sequence[str],
+    ticks: Mapping[int, Mapping[str, Grid]],
+    skipped: Mapping[int, Skipped] | None = None,
+    options: RunOptions = OPTIONS,
 ) -> list[Event]:
     """Return what a run with these maps would yield, as `replay.pipeline.run` does."""
     inputs = tuple(RobotInput(robot, f"/{robot}/map", f"{robot}/map", "header", (0,), 9) for robot in robots)
-    settings = OPTIONS.settings()
-    merger = Merger(robots, OPTIONS.merge)
+    settings = options.settings()
+    merger = Merger(robots, options.merge)
     report, gallery = ReportBuilder(inputs, settings, "9.9"), Gallery("changed", merger.explain)
     found: list[Event] = [Started(inputs, settings, ({"name": "run.mcap"},))]
     for stamp_ns, grids in ticks.items():
@@ -140,6 +148,18 @@ def test_the_entities_are_those_of_the_documented_tree(recording: Path) -> None:
     assert {"/summary", "/legend", "/skipped", "/status/r2", "/plots/pose/yaw/r2", "/evidence/r2/candidates"} <= found
     assert {f"/evidence/r2/{name}" for name in ("overlay", "orientation_spectra", "correlation_surface")} <= found
     assert not any("r4" in path for path in found if not path.startswith(("/plots", "/status")))
+
+
+def test_every_entity_is_documented(recording: Path, tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "output-formats.md").read_text(encoding="utf-8")
+    rows = [line for line in text[text.index("## Rerun recording") :].splitlines() if line.startswith("| `/")]
+    named = [name for row in rows for name in re.findall(r"`(/[^`]+)`", row.split("|")[1])]
+    patterns = {name: re.compile(re.sub(r"<\w+>", r"(?:[^/\\\\]|\\\\.)+", name)) for name in named}
+    driven = written(tmp_path / "driven.rrd", events_in("driven"))
+    found = {chunk.entity_path for path in (recording, driven) for chunk in RrdReader(path).stream()}
+    assert {path for path in found if not any(pattern.fullmatch(path) for pattern in patterns.values())} == set()
+    unused = {name for name, pattern in patterns.items() if not any(map(pattern.fullmatch, found))}
+    assert unused == {"/plots/acceptance/limit"}, "the method that is used states a confidence"
 
 
 def test_all_times_are_those_of_the_ticks(recording: Path) -> None:
@@ -496,18 +516,58 @@ def test_the_name_of_a_map_alone_is_in_its_middle() -> None:
 # The viewer
 
 
-def test_the_viewer_shows_it_without_complaint(recording: Path, tmp_path: Path) -> None:
-    needs_renderer()
-    from scripts.screenshot import complaints, show, show_tab, viewer
+@pytest.fixture(scope="module")
+def runs(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Runs of all outcomes: one robot of three is not merged, all are, nobody has a map, the paper's method."""
+    folder = tmp_path_factory.mktemp("runs")
+    by_paper = replace(OPTIONS, merge=MergeConfig(method="paper"))
+    ticks = {STAMPS[0]: {"r1": flat_map("r1"), "r2": flat_map("r2")}}
+    return {
+        "partly": recording,
+        "merged": written(folder / "merged.rrd", events_in("driven")),
+        "empty": written(folder / "empty.rrd", events_in("no_map_at_all")),
+        "none": written(folder / "none.rrd", events_of(["r1"], {})),
+        "paper": written(folder / "paper.rrd", events_of(["r1", "r2"], ticks, options=by_paper)),
+    }
 
+
+TABS = ("Merged", "Method", "Over time", "Decisions")
+
+
+@pytest.mark.parametrize("name", ["partly", "merged", "empty", "none", "paper"])
+def test_the_viewer_shows_every_tab_at_every_time_without_complaint(
+    runs: dict[str, Path], name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    needs_renderer()
+    from scripts import screenshot
+    from scripts.screenshot import complaints, seek, show, show_tab, tabs, viewer
+
+    monkeypatch.setattr(screenshot, "SETTLE_S", 0.5)  # long enough for views to report
     shown: set[str] = set()
     with viewer("1000x700") as client:
-        for time_fraction in (None, 0.0, 0.5):
-            show(client, recording, time_fraction)
-            for tab in ("Merged", "Method", "Over time", "Decisions"):
+        show(client, runs[name])
+        assert tabs(client) == [tab for tab in TABS if tab != "Method" or name not in ("empty", "none")]
+        for time_fraction in (1.0, 0.0, 0.5):
+            seek(client, time_fraction)
+            for tab in tabs(client):
                 show_tab(client, tab)
                 assert complaints(client) == []
                 shown |= {view.name for view in client.get_state().views if view.visible}
         client.save_screenshot(str(tmp_path / "shot.png"))
-    assert {"Maps", "Outcome", "Overlay", "Candidates", "Acceptance index", "Robots", "Skipped"} <= shown
+    assert {"Maps", "Outcome", "Acceptance index", "Placed at yaw, °", "Robots", "Skipped"} <= shown
+    assert ("Candidates" in shown) == (name not in ("empty", "none"))
+    assert ("Interest points" in shown) == (name == "paper")
     assert (tmp_path / "shot.png").stat().st_size > 10_000
+
+
+def test_the_library_finds_no_difference_between_two_runs(runs: dict[str, Path], tmp_path: Path) -> None:
+    """Of a run in which nobody was withdrawn: the library holds gaps in lines to differ from themselves."""
+    again = written(tmp_path / "again.rrd", events_in("driven"))
+    done = subprocess.run(
+        [str(program()), "rrd", "compare", "--unordered", str(runs["merged"]), str(again)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env=environment(),
+    )
+    assert done.returncode == 0, done.stderr
