@@ -8,7 +8,7 @@ SITE := .venv-docs
 PINNED := install --quiet --require-hashes --requirement
 PROJECT := install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: demo test check format docs site bench faults picture reports lock audit clean
+.PHONY: demo test check format docs site bench faults pictures reports lock audit clean
 
 demo: $(VENV)/.runtime ## set up and merge a sample recording
 	mkdir -p out
@@ -39,10 +39,8 @@ bench: $(VENV)/.dev ## measure placements against known truth
 faults: $(VENV)/.dev ## try damaged recordings for a minute
 	$(BIN)/python -m benchmarks.faults --seconds 60
 
-picture: $(VENV)/.runtime ## take README's picture anew; needs a graphics card or a software renderer (mesa-vulkan-drivers)
-	mkdir -p out
-	$(BIN)/replay merge samples/three_robots.bag -o out/three_robots.mcap --force
-	$(BIN)/python scripts/screenshot.py out/three_robots.rrd docs/images/three_robots.png
+pictures: $(VENV)/.runtime ## take the pictures of the docs anew; needs a graphics card or mesa-vulkan-drivers, and REPLAY_DATA
+	PYTHONPATH=. $(BIN)/python scripts/pictures.py
 
 reports: $(VENV)/.dev ## write docs/reports anew, and its picture; needs REPLAY_DATA, chromium and its driver
 	PYTHONPATH=. $(BIN)/python scripts/reports.py

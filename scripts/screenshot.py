@@ -33,6 +33,7 @@ _NOTICES_S = 5.0
 SETTLE_S = 1.5
 """How long it takes to draw what is shown anew."""
 _COLOURS = 256
+_BAR_PX = 37
 
 
 @contextmanager
@@ -124,6 +125,13 @@ def _contents(parts: dict[str, dict[str, object]]) -> list[str]:
     return [f"/{str(each).lstrip('/')}" for each in found]
 
 
+def hide_menu(client: ViewerClient) -> None:
+    """Leave out the viewer's own bar, which says how it draws here."""
+    found = client.get_blueprint()
+    found.blueprint["/top_panel"] = {"PanelBlueprint": {"state": "Hidden"}}
+    client.set_blueprint(found.blueprint, store_id=found.store_id)
+
+
 def complaints(client: ViewerClient) -> list[str]:
     """Return the warnings and errors of the views that are shown."""
     return [
@@ -159,6 +167,7 @@ def taken(
     found: list[str] = []
     with viewer(size) as client:
         show(client, recording)
+        hide_menu(client)
         time.sleep(_NOTICES_S)  # until the viewer's own notices are gone
         for name, at in product(names, times):
             if at is not None:
@@ -172,8 +181,9 @@ def taken(
 
 
 def save(client: ViewerClient, path: Path) -> None:
-    """Save what is shown in as many colours as it needs: the file is half as large as with all."""
+    """Save what is shown, without the bar that is hidden, in as many colours as it needs: half as large as with all."""
     image = Image.open(BytesIO(client.take_screenshot())).convert("RGB")
+    image = image.crop((0, _BAR_PX, *image.size))
     image.quantize(_COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(path, optimize=True)
 
 

@@ -76,7 +76,7 @@ def _merged(extent: Box | None, robots: int, span_ns: int) -> Part:
     words = rrb.Vertical(
         rrb.TextDocumentView(name="Outcome", origin=_path(SUMMARY)),
         rrb.TextDocumentView(name="How to read the map", origin=_path(LEGEND)),
-        row_shares=[3, 1],
+        row_shares=[4, 1],
     )
     strips = rrb.StateTimelineView(name="What each robot is", origin=_path(STATUS), time_view=_time_axis(span_ns, 0.0))
     share = _STRIP_SHARE * (1 + min(robots, _MOST_STRIPS))
@@ -95,7 +95,7 @@ def _matched(entities: RobotEntities, steps: Sequence[str]) -> Part:
     views = [rrb.Spatial2DView(name=_title(step), origin=_path([*entities.evidence, step])) for step in steps]
     found = rrb.TextDocumentView(name="Candidates", origin=_path(entities.candidates))
     if len(views) <= _MOST_ACROSS:
-        return rrb.Vertical(rrb.Horizontal(*views), found, row_shares=[3, 2], name=entities.label_text)
+        return rrb.Vertical(rrb.Horizontal(*views), found, row_shares=[13, 7], name=entities.label_text)
     grid = rrb.Grid(*views, grid_columns=_MOST_ACROSS)
     return rrb.Horizontal(grid, found, column_shares=[7, 3], name=entities.label_text)
 

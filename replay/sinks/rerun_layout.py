@@ -15,7 +15,7 @@ from replay.sinks.rerun_labels import PointM, label_places_m
 _LEAST_GAP_M = 2.0
 _GAP_SHARE = 0.08
 _LABEL_GAP_SHARE = 0.2
-_MARGIN = 1.06
+_MARGIN = 1.16
 _EYE_FIELD_RAD = math.radians(55.0)
 _EYE_ASPECT = 1.3
 _LABEL_SHARE = 0.08
@@ -63,7 +63,7 @@ class Layout:
     labels_m
         Where each of these robots' labels hangs.
     extent
-        What all of these maps cover; None without maps.
+        About what all of these maps know, without what only some rays reached; None without maps.
     """
 
     merged_from_map: Mapping[str, Sim2]
@@ -100,7 +100,7 @@ def lay_out(result: MergeResult, corners_m: Mapping[str, Points], places_m: Mapp
         shown.update(poses)
         labels_m.update(_below(poses, corners_m))
     ordered = {robot: shown[robot] for robot in result.robots if robot in shown}
-    return Layout(ordered, labels_m, _covered(ordered, corners_m))
+    return Layout(ordered, labels_m, _covered(ordered, {**corners_m, **places_m}))
 
 
 def _below(poses: Mapping[str, Sim2], corners_m: Mapping[str, Points]) -> dict[str, PointM]:

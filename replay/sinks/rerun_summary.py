@@ -17,10 +17,9 @@ _STATUSES = {"unmerged": "**not merged**", "no_map": "**without a map**"}
 _EVENTS = {"jumped": "jumped in its own frame", "withdrawn": "was withdrawn for a time"}
 
 LEGEND = """\
-**Walls** are in the colour of the robot that mapped them, **thin lines** the ways that robots drove.
-
-**Green** ground: two maps or more know it, and agree. **Red**: a wall of one map in free space of another. \
-**Grey**: one map alone knows it. A map that is not merged stands beside the others.
+- **Walls** are in the colour of the robot that mapped them, and **thin lines** show where it drove.
+- **Green** is where two maps or more agree, **red** where a wall of one stands in free space of another, and **grey** \
+what one map alone knows.
 """
 
 
