@@ -56,7 +56,6 @@ COMMANDS: dict[str, Command] = {
     "recover": Command(
         "replay.commands.recover", "main job", "make a readable MCAP of one that was cut off, such as OUT.mcap.partial"
     ),
-    "view": Command("replay.commands.view", "after a run", "look at what came of a run, in Rerun's viewer"),
     "export": Command(
         "replay.commands.export", "after a run", "write maps as map_server loads them, pictures, or transforms"
     ),
