@@ -42,7 +42,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as scratch:
         for name in RECORDINGS:
             page = REPORTS / f"{Path(name).stem}.html"
-            outputs = ["-o", f"{scratch}/out.mcap", "--report", str(page), "--no-rrd", "--images", "none", "--force"]
+            outputs = ["-o", f"{scratch}/out.mcap", "--report", str(page), "--no-rrd", "--force"]
             status = replay(["merge", str(Path(data) / "real" / name), *outputs])
             if status:
                 return status

@@ -28,6 +28,7 @@ _SHARED: Rgb = (255, 255, 255)
 _TINT: Rgb = (196, 236, 208)
 
 _GREYS = 24
+_COMPRESSION = 6  # more takes ten times as long, for files that are a fifth smaller
 _THIN_FROM_PX = 420
 
 
@@ -170,5 +171,5 @@ def _uri(indices: Indices, colours: Sequence[Rgb]) -> str:
     image = Image.fromarray(np.ascontiguousarray(indices[::-1]), mode="P")
     image.putpalette(bytes(part for colour in colours for part in colour))
     stream = io.BytesIO()
-    image.save(stream, "PNG", optimize=True, transparency=0)
+    image.save(stream, "PNG", compress_level=_COMPRESSION, transparency=0)
     return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode('ascii')}"

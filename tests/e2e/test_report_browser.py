@@ -100,6 +100,22 @@ def test_nothing_to_complain_of(chrome: Chrome, pages: dict[str, Path], name: st
     assert chrome.execute_script(wide) == [width, width, width]
 
 
+@pytest.mark.parametrize("width", [320, 600, 800, 1061, 1261])
+@pytest.mark.parametrize("name", ["three_robots_one_unplaced", "many_robots", "believed"])
+def test_it_fits_any_window(chrome: Chrome, pages: dict[str, Path], name: str, width: int) -> None:
+    open_page(chrome, pages[name], width)
+    beyond = """
+        const scrolled = '.scroll, .cards.small, pre, svg, .sheet';
+        return [...document.querySelectorAll('main *')]
+            .filter((each) => each.getClientRects().length && !each.closest(scrolled))
+            .filter((each) => each.getBoundingClientRect().right > innerWidth + 1)
+            .map((each) => each.outerHTML.slice(0, 150))
+    """
+    assert chrome.execute_script(beyond) == []
+    box = "document.querySelector('.robots').parentElement"
+    assert chrome.execute_script(f"return {box}.scrollWidth - {box}.clientWidth") <= 0
+
+
 @pytest.mark.parametrize("name", ["three_robots_one_unplaced", "restarted", "no_reference", "believed", "many_robots"])
 @pytest.mark.parametrize("width", [DESK, PHONE], ids=["desk", "phone"])
 def test_it_is_accessible_to_all(chrome: Chrome, pages: dict[str, Path], name: str, width: int) -> None:
