@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import reprlib
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
@@ -12,9 +11,13 @@ from pathlib import Path
 from typing import NoReturn, TypeVar
 
 from replay.errors import InputError
+from replay.plain_text import brief
 
 _Value = TypeVar("_Value")
 Keys = tuple[str | int, ...]
+
+MOST = 1e12
+"""No length, area, time or ratio that a document names is larger: what follows from them is finite."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +44,7 @@ class Node:
     @property
     def place(self) -> str:
         """Where it is, in words."""
-        named = ".".join(map(str, self.keys)) or "it"
+        named = ".".join(brief(str(key)) for key in self.keys) or "it"
         around = (self.keys[:count] for count in range(len(self.keys), 0, -1))
         line = next((self.lines[keys] for keys in around if keys in self.lines), None)
         return named if line is None else f"line {line}: {named}"
@@ -90,7 +93,7 @@ class Node:
             if key not in known:
                 close = get_close_matches(key, known, n=1, cutoff=0.6)
                 meant = f"did you mean '{close[0]}'?" if close else f"expected {', '.join(known)}"
-                raise InputError(f"{self.file}: {node.place}: there is no key '{key}' here; {meant}")
+                raise InputError(f"{self.file}: {node.place}: there is no key '{brief(key)}' here; {meant}")
 
     def text(self) -> str:
         """Return the value as text."""
@@ -106,18 +109,18 @@ class Node:
         """Return the value as true or false."""
         return self.value if isinstance(self.value, bool) else self.refuse("true or false")
 
-    def number(self, low: float = -math.inf, high: float = math.inf) -> float:
-        """Return the value as a finite number within limits, which belong to it."""
+    def number(self, low: float = -MOST, high: float = MOST) -> float:
+        """Return the value as a number within limits, which belong to it; larger ones than `MOST` are none."""
         if isinstance(self.value, int | float) and not isinstance(self.value, bool):
             with suppress(OverflowError):
                 number = float(self.value)
-                if math.isfinite(number) and low <= number <= high:
+                if low <= number <= high:
                     return number
         return self.refuse(_number_words(low, high))
 
     def whole(self) -> int:
-        """Return the value as a whole number, not negative."""
-        if isinstance(self.value, int) and not isinstance(self.value, bool) and self.value >= 0:
+        """Return the value as a whole number of 64 bits, not negative."""
+        if isinstance(self.value, int) and not isinstance(self.value, bool) and 0 <= self.value < 1 << 64:
             return self.value
         return self.refuse("a whole number, 0 or more")
 
@@ -130,6 +133,6 @@ class Node:
 
 
 def _number_words(low: float, high: float) -> str:
-    if math.isinf(low) and math.isinf(high):
+    if (low, high) == (-MOST, MOST):
         return "a number"
-    return f"a number of at least {low:g}" if math.isinf(high) else f"a number from {low:g} to {high:g}"
+    return f"a number of at least {low:g}" if high == MOST else f"a number from {low:g} to {high:g}"

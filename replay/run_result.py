@@ -16,6 +16,7 @@ from replay.events import Report
 
 STATUSES = ("reference", "merged", "unmerged", "no_map")
 _PLACED = ("reference", "merged")
+MOST_SCALE = 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +111,7 @@ class RunResult:
 
 def pose_of(node: Node) -> Sim2:
     """Read a pose as reports have it: ``x_m``, ``y_m``, ``yaw_rad`` and, if it is not 1, ``scale``."""
-    scale = node.maybe("scale", Node.number)
-    if scale is not None and scale <= 0.0:
-        node.need("scale").refuse("a number above 0")
+    scale = node.maybe("scale", lambda item: item.number(1.0 / MOST_SCALE, MOST_SCALE))
     return Sim2(
         node.need("x_m").number(),
         node.need("y_m").number(),

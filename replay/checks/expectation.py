@@ -9,9 +9,9 @@ from pathlib import Path
 
 from mapmerge.reasons import ReasonCode
 from mapmerge.sim2 import Sim2
-from replay.documents import Node
+from replay.documents import MOST, Node
 from replay.read_document import read_yaml
-from replay.run_result import STATUSES
+from replay.run_result import MOST_SCALE, STATUSES
 from replay.skip_cause import SkipCause
 
 WITHIN_M, WITHIN_DEG, WITHIN_SCALE = 0.1, 0.5, 0.01
@@ -132,7 +132,7 @@ def _robot(node: Node, defaults: Node) -> RobotExpectation:
     if node.get("reason") is not None:
         node.need("reason").refuse("no reason of a robot that is to be merged; leave it out")
 
-    def limit(key: str, high: float = math.inf) -> float | None:
+    def limit(key: str, high: float = MOST) -> float | None:
         found = node.get(key) or defaults.get(key)
         return None if found is None else found.number(0.0, high)
 
@@ -166,7 +166,7 @@ def _pose(node: Node, robot: Node, defaults: Node) -> PoseExpectation:
     if (node.get("yaw_deg") is None) == (node.get("yaw_rad") is None):
         node.refuse("either yaw_deg or yaw_rad, beside x_m and y_m")
     yaw_deg, yaw_rad = node.maybe("yaw_deg", Node.number), node.maybe("yaw_rad", Node.number)
-    scale = node.maybe("scale", lambda item: item.number(1e-6))
+    scale = node.maybe("scale", lambda item: item.number(1.0 / MOST_SCALE, MOST_SCALE))
 
     def within(key: str, otherwise: float) -> float:
         found = node.get(key) or robot.get(key) or defaults.get(key)

@@ -6,8 +6,10 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from mapmerge.rounding import rounded_down
 from mapmerge.sim2 import Sim2, wrap_angle
 from replay.checks.expectation import Expectation, PoseExpectation, RobotExpectation
+from replay.figures import degrees, fixed
 from replay.run_result import RobotResult, RunResult
 
 RUN = "run"
@@ -111,7 +113,7 @@ def _pose(robot: str, expected: PoseExpectation, found: Sim2 | None) -> Finding:
     off_m = math.hypot(x_m - true_x_m, y_m - true_y_m)
     off_deg = abs(math.degrees(wrap_angle(found.yaw_rad - true.yaw_rad)))
     holds = off_m <= expected.within_m and off_deg <= expected.within_deg
-    is_at = f"x {found.x_m:.3f} m, y {found.y_m:.3f} m, yaw {math.degrees(found.yaw_rad):.2f}°"
+    is_at = f"x {fixed(found.x_m, 3)} m, y {fixed(found.y_m, 3)} m, yaw {degrees(found.yaw_rad, 2)}°"
     said = f"it lies {off_m:.3f} m and {off_deg:.2f}° off, at {is_at}"
     if expected.scaled:
         off = abs(found.scale / true.scale - 1.0)
@@ -122,5 +124,4 @@ def _pose(robot: str, expected: PoseExpectation, found: Sim2 | None) -> Finding:
 
 def _down(value: float, form: str) -> str:
     """Return a figure rounded down, so that what is less than a limit reads like that."""
-    digits = int(form.partition(".")[2][0])
-    return form.format(math.floor(value * 10**digits) / 10**digits)
+    return form.format(rounded_down(value, int(form.partition(".")[2][0])))

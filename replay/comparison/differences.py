@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from mapmerge.sim2 import Sim2, wrap_angle
 from replay.errors import UsageError
+from replay.figures import degrees, fixed
 from replay.run_result import RobotResult, RunResult
 
 _DIGITS = 6
@@ -182,7 +183,7 @@ def _rounded(amounts: Mapping[str, float]) -> dict[str, float]:
 
 def pose_words(pose: Sim2) -> str:
     """Return a pose in words."""
-    return f"x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, yaw {math.degrees(pose.yaw_rad):.2f}°"
+    return f"x {fixed(pose.x_m, 3)} m, y {fixed(pose.y_m, 3)} m, yaw {degrees(pose.yaw_rad, 2)}°"
 
 
 def _notes(before: RunResult, after: RunResult, frame: Sim2 | None) -> Iterator[str]:

@@ -84,7 +84,11 @@ def load_truth(path: Path) -> Truth:
     InputError
         If it is none.
     """
-    node = read_json(path)
+    return truth_of(read_json(path))
+
+
+def truth_of(node: Node) -> Truth:
+    """Read what is truly so."""
     return Truth(
         node.need("reference").text(),
         {name: _robot(item) for name, item in node.need("robots").items()},

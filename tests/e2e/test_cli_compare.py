@@ -183,7 +183,7 @@ def test_what_is_no_report_is_refused(replay: Program, outcome: Path, content: b
             "far",
             "robots.r2.merged_from_map.x_m is 'far'; expected a number",
         ),
-        (("robots", "r2", "merged_from_map", "scale"), -1, "expected a number above 0"),
+        (("robots", "r2", "merged_from_map", "scale"), -1, "expected a number from 1e-06 to 1e+06"),
         (("robots", "r2", "merged_from_map"), None, "expected a placed robot to have a pose"),
         (("robots",), [], "expected a mapping"),
         (("inputs",), {}, "expected a list"),
