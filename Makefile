@@ -32,6 +32,7 @@ docs: $(VENV)/.dev ## write docs/cli.md anew from --help
 
 site: $(SITE)/.installed ## make the site from docs/ and the docstrings, in out/site
 	$(SITE)/bin/sphinx-build -q -W --keep-going -n -c docs -d out/doctrees . out/site
+	$(SITE)/bin/python scripts/site_links.py out/site
 
 bench: $(VENV)/.dev ## measure placements against known truth
 	$(BIN)/python -m benchmarks.truth

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from replay.api import MergeRun, merge
     from replay.errors import InputError, OutputError, ReplayError, UsageError
-    from replay.events import Finished, Merged, Noted, Skipped, Started
+    from replay.events import Finished, Merged, Moved, Noted, Skipped, Started
     from replay.init_pose import InitPose
     from replay.report_file import read_report
 
@@ -20,6 +20,7 @@ __all__ = [
     "InputError",
     "MergeRun",
     "Merged",
+    "Moved",
     "Noted",
     "OutputError",
     "ReplayError",
@@ -36,6 +37,7 @@ _MODULES = {
     "InputError": "errors",
     "MergeRun": "api",
     "Merged": "events",
+    "Moved": "events",
     "Noted": "events",
     "OutputError": "errors",
     "ReplayError": "errors",

@@ -16,7 +16,15 @@ from replay.errors import UsageError
 from replay.events import Event, Finished, Report
 from replay.footprint import size_to_bytes
 from replay.init_pose import InitPose
-from replay.options import ClockChoice, ImageChoice, OutputOptions, RunOptions, TimeBound, seconds_to_ns
+from replay.options import (
+    ClockChoice,
+    ImageChoice,
+    OutputOptions,
+    RunOptions,
+    TimeBound,
+    TrajectoryChoice,
+    seconds_to_ns,
+)
 from replay.runs import RunPath, TopicChoice
 
 if TYPE_CHECKING:
@@ -43,6 +51,7 @@ def merge(
     min_confidence: float | None = None,
     max_memory: int | str | None = None,
     images: ImageChoice | None = None,
+    trajectories: TrajectoryChoice | None = None,
     strict: bool = False,
     jobs: int = 1,
 ) -> MergeRun:
@@ -81,6 +90,9 @@ def merge(
     images
         Which intermediate images are rendered: ``none``, ``changed`` or ``all``. None: ``changed`` where they are
         written, else ``none``.
+    trajectories
+        Of which recordings it is read from ``/tf`` where robots drove: ``none``, ``auto`` (not of large ones) or
+        ``all``. None: ``auto`` where the Rerun recording is written, else ``none``.
     strict
         Whether a message that cannot be used ends the run.
     jobs
@@ -121,9 +133,10 @@ def merge(
         use_tf=use_tf,
         merge=_merge_config(config or MergeConfig(), method, scale, min_confidence),
         max_memory_bytes=size_to_bytes(max_memory) if isinstance(max_memory, str) else max_memory,
+        trajectories=_one_of("trajectories", trajectories or "none", ("none", "auto", "all")),
         jobs=jobs,
     )
-    return MergeRun(options, written_images=images or "changed")
+    return MergeRun(options, written_images=images or "changed", written_trajectories=trajectories or "auto")
 
 
 class MergeRun(Iterator[Event]):
@@ -133,14 +146,22 @@ class MergeRun(Iterator[Event]):
     ----------
     options
         What it was told.
-    written_images
-        Which intermediate images are rendered where they are written.
+    written_images, written_trajectories
+        Which intermediate images are rendered, and of which recordings it is read where robots drove, where that is
+        written.
     """
 
-    def __init__(self, options: RunOptions, *, written_images: ImageChoice = "changed") -> None:
+    def __init__(
+        self,
+        options: RunOptions,
+        *,
+        written_images: ImageChoice = "changed",
+        written_trajectories: TrajectoryChoice = "auto",
+    ) -> None:
         self.options = options
         """What it was told, as a value."""
         self._written_images = written_images
+        self._written_trajectories = written_trajectories
         self._events: Generator[Event, None, None] | None = None
 
     def __next__(self) -> Event:
@@ -215,7 +236,8 @@ class MergeRun(Iterator[Event]):
             copy_maps=copy_maps,
             force=force,
         )
-        options = replace(self.options, images=self._written_images)
+        trajectories: TrajectoryChoice = self._written_trajectories if rrd else "none"
+        options = replace(self.options, images=self._written_images, trajectories=trajectories)
         self._events = _nothing()
         refuse_outputs(written, [item.path for item in options.runs])
         with open_plan(options) as plan:

@@ -14,6 +14,7 @@ import pytest
 
 import mapmerge
 import replay
+from scripts.site_links import broken, read_pages
 from tests.data_paths import ROOT
 
 API = {"mapmerge": mapmerge, "replay": replay}
@@ -71,3 +72,17 @@ def test_what_the_documents_say_in_python_is_right(tmp_path: Path, monkeypatch: 
         exec(compile(block, "python.md", "exec"), names)  # noqa: S102 - our own
     assert names["report"]["robots"]["r2"]["status"] == "merged"  # type: ignore[index]
     assert (tmp_path / "out.json").exists()
+
+
+def test_links_that_lead_nowhere_are_found(tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "b.html").write_text('<h1 id="top">B</h1><a href="../a.html#there">a</a>', encoding="utf-8")
+    (tmp_path / "a.html").write_text(
+        '<p id="here"><a href="sub/b.html#top">b</a> <a href="#here">up</a> <a href="https://example.org/x">x</a>',
+        encoding="utf-8",
+    )
+    assert list(broken(tmp_path, read_pages(tmp_path))) == [
+        f"{Path('sub') / 'b.html'}: ../a.html#there: there is no such place on that page"
+    ]
+    (tmp_path / "c.html").write_text('<img src="gone.png">', encoding="utf-8")
+    assert any("gone.png: there is no such file" in line for line in broken(tmp_path, read_pages(tmp_path)))
