@@ -19,7 +19,8 @@ from replay.plan import Plan
 from replay.pose3 import Pose3
 from replay.runs import RunPath
 from replay.sources import open_source
-from replay.trajectories import AUTO_BYTES, MOST_POSES, STEP_M, Thinned, Tracker
+from replay.tracker import MOST_POSES, STEP_M, Tracker
+from replay.trajectories import AUTO_BYTES, Thinned
 from tests.bags import SECOND, Recorded, write_mcap, write_rosbag1, write_rosbag2
 from tests.program import Program
 from tests.runs import growing, in_log_order, link, linked, two_robots
