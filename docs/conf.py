@@ -49,7 +49,7 @@ nitpicky = True
 # No list of another project's pages is fetched, so that the site is built without a network: types of the standard
 # library and of numpy have no page to lead to.
 nitpick_ignore_regex = [
-    ("py:.*", r"NDArray|(numpy|np|collections|typing|datetime|pathlib|os|enum|dataclasses)\..*"),
+    ("py:.*", r"(numpy|np|collections|typing|datetime|pathlib|os|enum|dataclasses)\..*|NDArray"),
 ]
 
 
