@@ -21,14 +21,14 @@ check: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python scripts/cli_reference.py --check
+	$(BIN)/python scripts/reference_pages.py --check
 
 format: $(VENV)/.dev ## format the code and fix what can be fixed
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-docs: $(VENV)/.dev ## write docs/cli.md anew from --help
-	$(BIN)/python scripts/cli_reference.py
+docs: $(VENV)/.dev ## write docs/cli.md and docs/settings.md anew from what the program says
+	$(BIN)/python scripts/reference_pages.py
 
 site: $(SITE)/.installed ## make the site from docs/ and the docstrings, in out/site
 	$(SITE)/bin/sphinx-build -q -W --keep-going -n -c docs -d out/doctrees . out/site
