@@ -32,7 +32,9 @@ def pages() -> Mapping[str, str]:
 
 def _cli() -> str:
     commands = ((), *((name,) for name in COMMANDS))
-    parts = [f"## {' '.join(('replay', *command))}\n\n```text\n{_said(*command, '--help')}\n```\n" for command in commands]
+    parts = [
+        f"## {' '.join(('replay', *command))}\n\n```text\n{_said(*command, '--help')}\n```\n" for command in commands
+    ]
     return "\n".join([_CLI_HEAD, *parts])
 
 
