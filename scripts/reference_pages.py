@@ -31,11 +31,12 @@ def pages() -> Mapping[str, str]:
 
 
 def _cli() -> str:
-    commands = ((), *((name,) for name in COMMANDS))
-    parts = [
-        f"## {' '.join(('replay', *command))}\n\n```text\n{_said(*command, '--help')}\n```\n" for command in commands
-    ]
+    parts = [_section(command) for command in ((), *((name,) for name in COMMANDS))]
     return "\n".join([_CLI_HEAD, *parts])
+
+
+def _section(command: tuple[str, ...]) -> str:
+    return f"## {' '.join(('replay', *command))}\n\n```text\n{_said(*command, '--help')}\n```\n"
 
 
 def _said(*arguments: str) -> str:
