@@ -8,6 +8,8 @@ from enum import IntEnum
 from time import perf_counter
 from typing import IO, TYPE_CHECKING
 
+from mapmerge.reasons import ReasonCode
+from replay.advice import ADVICE
 from replay.colours import are_on
 from replay.decisions import decisions
 from replay.events import Event, Merged, Noted, Report, Skipped, Started
@@ -173,6 +175,8 @@ class Narrator:
             )
         if late:
             self.say(f"{counted(late, 'message')} too late to be put in order of time: taken in on arrival")
+        for line in what_to_do(report):
+            self.say(line)
         spent_s = perf_counter() - self._begin_s
         self.say(
             f"{counted(report['updates'], 'map')} at {counted(self._ticks, 'time')} in {spent_s:.1f} s: "
@@ -202,6 +206,16 @@ def _least(is_least: bool) -> str:
 
 def _ends_early(skipped: Report) -> bool:
     return bool(skipped["cause"] == SkipCause.ENDS_EARLY)
+
+
+def what_to_do(report: Report) -> Iterator[str]:
+    """Yield what may be done about maps that are not merged, once for each reason."""
+    by_reason: dict[ReasonCode, list[str]] = {}
+    for robot, row in report["robots"].items():
+        by_reason.setdefault(ReasonCode(row["reason"]["code"]), []).append(robot)
+    for code, robots in by_reason.items():
+        if ADVICE[code] and any(report["robots"][robot]["merged_from_map"] is None for robot in robots):
+            yield f"{listed(robots)}: {ADVICE[code]}"
 
 
 def told(event: Merged, after: str) -> Iterator[str]:

@@ -61,6 +61,13 @@ def test_reason_codes() -> None:
     assert SCHEMA["$defs"]["reason"]["properties"]["code"]["enum"] == expected
 
 
+def test_every_reason_has_something_to_do() -> None:
+    page = (ROOT / "docs/tuning.md").read_text(encoding="utf-8")
+    told = {code for row in re.findall(r"^\| (`[^|]+)\|", page, re.MULTILINE) for code in re.findall(r"`(\w+)`", row)}
+    fine = {str(ReasonCode.REFERENCE), str(ReasonCode.ACCEPTED)}
+    assert {str(code) for code in ReasonCode} - fine <= told
+
+
 def test_causes_of_skipped_messages() -> None:
     expected = [str(cause) for cause in SkipCause]
     assert table("Causes of skipped messages") == expected
