@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from mapmerge.outcome import Pair
 from mapmerge.watch import Trigger
 from replay.events import Report
-from replay.sinks.rerun_text import cell, number, paragraph, table
+from replay.figures import NO_FIGURE, area, degrees, fixed, percent, share
+from replay.sinks.rerun_text import cell, paragraph, table
 
 _COLUMNS = ("", "x, m", "y, m", "yaw, °", "score, m", "as likely as the best")
 _MOST = 12
@@ -49,18 +49,18 @@ def candidates(report: Report, pair: Pair) -> str:
 def _figures(scores: Mapping[str, Any] | None, confidence: float | None) -> str:
     if scores is None:
         return ""
-    said = [f"acceptance index **{scores['acceptance']:.3f}**", f"overlap **{scores['overlap_m2']:.1f} m²**"]
+    said = [f"acceptance index **{share(scores['acceptance'])}**", f"overlap **{area(scores['overlap_m2'])}**"]
     if confidence is not None:
-        said.insert(0, f"confidence **{100 * confidence:.2f} %**")
+        said.insert(0, f"confidence **{percent(confidence)}**")
     return ", ".join(said)
 
 
 def _row(name: str, pose: Mapping[str, float], score_m: float | None, likelihood: float | None) -> tuple[str, ...]:
     if name == "best":
-        share = "1"
+        times = "1"
     elif likelihood is None:
-        share = "–"
+        times = NO_FIGURE
     else:
-        share = f"{likelihood:.3f}" if likelihood >= 0.001 else "< 0.001"
-    yaw = number(math.degrees(pose["yaw_rad"]), 1)
-    return name, number(pose["x_m"], 2), number(pose["y_m"], 2), yaw, number(score_m, 1), share
+        times = f"{likelihood:.3f}" if likelihood >= 0.001 else "< 0.001"
+    score = NO_FIGURE if score_m is None else fixed(score_m, 1)
+    return name, fixed(pose["x_m"], 2), fixed(pose["y_m"], 2), degrees(pose["yaw_rad"]), score, times

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from replay.events import Report
+from replay.figures import NO_FIGURE, area, percent, share
 from replay.sinks.rerun_entities import RobotEntities
 from replay.sinks.rerun_text import cell, paragraph
 from replay.words import counted
@@ -86,15 +87,15 @@ def _is(values: Mapping[str, Any]) -> str:
 
 def _sure(values: Mapping[str, Any]) -> str:
     if values["merged_from_map"] is None or values["placed_via"] is None:
-        return "–"
+        return NO_FIGURE
     if values["confidence"] is not None:
-        return f"{100 * values['confidence']:.2f} %"
-    return "–" if values["acceptance"] is None else f"acceptance {values['acceptance']:.3f}"
+        return percent(values["confidence"])
+    return NO_FIGURE if values["acceptance"] is None else f"acceptance {share(values['acceptance'])}"
 
 
 def _overlap(values: Mapping[str, Any]) -> str:
     is_placed = values["merged_from_map"] is not None and values["overlap_m2"] is not None
-    return f"{values['overlap_m2']:.0f} m²" if is_placed else "–"
+    return area(values["overlap_m2"]) if is_placed else NO_FIGURE
 
 
 def _wrong(report: Report) -> list[str]:

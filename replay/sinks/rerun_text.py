@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from replay.decisions import INFO, WARN, Entry
 from replay.events import Noted, Report, Skipped
+from replay.figures import NO_FIGURE, area, degrees, fixed, share
 from replay.plain_text import plain, plain_json
 from replay.words import lost
 
 _MARKS = re.compile(r"[\\`*_\[\]<>#]")
-_COLUMNS = ("robot", "status", "x, m", "y, m", "yaw, °", "acceptance", "overlap, m²", "confidence")
+_COLUMNS = ("robot", "status", "x, m", "y, m", "yaw, °", "acceptance", "overlap", "confidence")
 
 
 def skipped(event: Skipped) -> Entry:
@@ -69,28 +69,15 @@ def about(report: Report) -> str:
 
 
 def _row(robot: str, values: Mapping[str, Any]) -> tuple[str, ...]:
-    pose = values["merged_from_map"] or {}
-    yaw_rad = pose.get("yaw_rad")
-    return (
-        cell(robot),
-        cell(values["status"]),
-        number(pose.get("x_m"), 2),
-        number(pose.get("y_m"), 2),
-        number(None if yaw_rad is None else math.degrees(yaw_rad), 1),
-        number(values["acceptance"], 3),
-        number(values["overlap_m2"], 1),
-        number(values["confidence"], 4),
-    )
+    pose = values["merged_from_map"]
+    place = (fixed(pose["x_m"], 2), fixed(pose["y_m"], 2), degrees(pose["yaw_rad"])) if pose else (NO_FIGURE,) * 3
+    agreement = share(values["acceptance"]), area(values["overlap_m2"]), share(values["confidence"], 4)
+    return (cell(robot), cell(values["status"]), *place, *agreement)
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a table in Markdown, of text that stays in its cells."""
     return "\n".join("| " + " | ".join(row) + " |" for row in (columns, ("---",) * len(columns), *rows))
-
-
-def number(value: float | None, digits: int) -> str:
-    """Return a number with so many digits after its point, or nothing."""
-    return "" if value is None else f"{value:.{digits}f}"
 
 
 def cell(text: str) -> str:
