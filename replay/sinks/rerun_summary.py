@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from mapmerge.reasons import ReasonCode
+from replay.advice import ADVICE
 from replay.events import Report
 from replay.figures import NO_FIGURE, area, percent, share
 from replay.sinks.rerun_entities import RobotEntities
@@ -101,7 +103,7 @@ def _overlap(values: Mapping[str, Any]) -> str:
 def _wrong(report: Report) -> list[str]:
     """Say which robots are not merged and why, what jumped or was withdrawn, and how much was skipped."""
     found = [
-        f"**{cell(robot)}** is not merged: {paragraph(values['reason']['message'])}"
+        f"**{cell(robot)}** is not merged: {paragraph(values['reason']['message'])}{_advice(values['reason']['code'])}"
         for robot, values in report["robots"].items()
         if values["merged_from_map"] is None
     ]
@@ -115,6 +117,12 @@ def _wrong(report: Report) -> list[str]:
     if len(found) > _MOST_WRONG:
         found = [*found[:_MOST_WRONG], f"and {len(found) - _MOST_WRONG} more: see *Decisions*"]
     return found
+
+
+def _advice(code: str) -> str:
+    """Return what may be done about it; it is our own text, with commands in backquotes."""
+    advice = ADVICE[ReasonCode(code)]
+    return f". *What to do:* {advice}" if advice else ""
 
 
 def _lately(said: Sequence[Said]) -> Iterator[str]:
