@@ -8,7 +8,10 @@ SITE := .venv-docs
 PINNED := install --quiet --require-hashes --requirement
 PROJECT := install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: demo test check format docs site bench faults pictures reports lock audit clean
+.PHONY: help demo test check format docs site bench faults pictures reports lock audit clean
+
+help: ## list what can be made
+	@sed -n 's/^\([a-z]*\):.*## /\1: /p' Makefile
 
 demo: $(VENV)/.runtime ## set up and merge a sample recording
 	mkdir -p out

@@ -53,7 +53,8 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise what is wrong as `UsageError`."""
         message = message.removeprefix("argument ")
-        raise UsageError(f"{message}{self._meant(message)}; `{self.prog} --help` lists what there is")
+        meant = self._meant(message)
+        raise UsageError(f"{message}{meant or ';'} `{self.prog} --help` lists what there is")
 
     def _check_value(self, action: argparse.Action, value: object) -> None:
         """Refuse a value that is none of the choices, in the same words whatever the version of Python."""
@@ -138,6 +139,8 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
         If help or the version was asked for, which is printed.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if given[:1] == ["help"]:
+        given = [*given[1:2], "--help"]
     if given and given[0] in COMMANDS:
         options = command_parser(given[0]).parsed(given[1:])
         options.command = given[0]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 from replay.errors import InputError, UsageError
 from replay.plain_text import brief, listed
@@ -82,7 +83,7 @@ def select(
     selected = []
     for robot in wanted:
         candidates = found.get(robot) or _by_component(robot, runs, infos, topics, counts)
-        selected.append(_one(robot, candidates, there))
+        selected.append(_one(robot, candidates, there, found))
     _refuse_shared(selected)
     return tuple(selected)
 
@@ -198,9 +199,11 @@ def _all_names(runs: Sequence[RunPath], found: Mapping[str, Candidates]) -> list
     return [*given, *sorted(set(found) - set(given))]
 
 
-def _one(robot: str, candidates: Candidates, there: str) -> Selected:
+def _one(robot: str, candidates: Candidates, there: str, names: Collection[str]) -> Selected:
     if not candidates:
-        raise UsageError(f"there is no map of robot {robot!r}; there are: {there}")
+        alike = [name for name in names if name.lower() == robot.lower()] or get_close_matches(robot, names, 1)
+        meant = f"did you mean {alike[0]!r}? There are" if alike else "there are"
+        raise UsageError(f"there is no map of robot {robot!r}; {meant}: {there}")
     if len(candidates) > 1:
         choices = _flags({robot: candidates})
         raise UsageError(f"robot {robot!r} has {len(candidates)} map topics; choose one of: {choices}")

@@ -83,8 +83,7 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig, o
         )
         return Reason(ReasonCode.ACCEPTED, message)
     if scores.score_m <= 0.0 or scores.wall_agreement < config.poor_agreement:
-        message = f"of the walls in the overlap {rounded_down(scores.wall_agreement, 2):.0%} agree; {doubt}"
-        return Reason(ReasonCode.WALLS_DISAGREE, message)
+        return Reason(ReasonCode.WALLS_DISAGREE, f"{_disagreeing(scores, config)}; {doubt}")
     if rival > config.rival_likelihood and cues.contest.log_odds >= 0.0:
         message = f"another placement is {_times(rival)} times as likely as this one; {doubt}"
         return Reason(ReasonCode.AMBIGUOUS, message)
@@ -93,6 +92,13 @@ def judge(scores: Scores, cues: Cues, confidence: float, config: VerifyConfig, o
         f"{rounded_down(scores.wall_agreement, 2):.0%} of what can be compared; {doubt}"
     )
     return Reason(ReasonCode.LOW_CONFIDENCE, message)
+
+
+def _disagreeing(scores: Scores, config: VerifyConfig) -> str:
+    agree, least = percent_below(scores.wall_agreement, config.poor_agreement)
+    if scores.wall_agreement < config.poor_agreement:
+        return f"of the walls in the overlap only {agree} agree, less than {least}"
+    return f"of the walls in the overlap {agree} agree, but more speaks against the placement than for it"
 
 
 def is_far_likelier(one: Match, other: Match, config: VerifyConfig) -> bool:

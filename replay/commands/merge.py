@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE, interrupted_late
 from replay.flags import inputs, outputs, placing, rules, talk
-from replay.standard_streams import printing, takes
+from replay.plain_text import listed, plain
+from replay.standard_streams import printing, say, takes
 
 if TYPE_CHECKING:
     from replay.events import Report
@@ -56,6 +57,8 @@ def run(options: argparse.Namespace) -> int:
         status = EXIT_DIFFERS if options.require_all and not _all_merged(report) else EXIT_DONE
         _print(report, options)
         narrator.sum_up(report, [str(path) for path in output_paths(written).values()])
+        if status == EXIT_DIFFERS:
+            say(f"replay: {_missing(report)}; --require-all makes that a failure")
     except KeyboardInterrupt:
         if not narrator.is_published:
             raise
@@ -75,6 +78,12 @@ def _print(report: Report, options: argparse.Namespace) -> None:
         if options.json and not takes(text):
             text = report_text(report, is_ascii=True)
         sys.stdout.write(text)
+
+
+def _missing(report: Report) -> str:
+    """Return who is not merged."""
+    left = [robot for robot, row in report["robots"].items() if row["status"] not in ("reference", "merged")]
+    return f"not merged: {listed([plain(robot) for robot in left])}" if left else "there is only one map"
 
 
 def _all_merged(report: Report) -> bool:

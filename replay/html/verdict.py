@@ -31,8 +31,8 @@ class Refusal:
     ----------
     members
         The robots.
-    reason
-        The reason in words; that of the first one.
+    reason, code
+        The reason in words, that of the first one, and its code.
     is_example
         Whether others have it in other words.
     advice
@@ -41,6 +41,7 @@ class Refusal:
 
     members: tuple[Member, ...]
     reason: str
+    code: str
     is_example: bool
     advice: str
 
@@ -94,7 +95,7 @@ def _refusals(story: Story) -> Iterator[Refusal]:
         first = refused[group[0]]
         is_example = any(refused[robot]["message"] != first["message"] for robot in group)
         members = tuple(story.member(robot) for robot in group)
-        yield Refusal(members, first["message"], is_example, ADVICE[ReasonCode(first["code"])])
+        yield Refusal(members, first["message"], first["code"], is_example, ADVICE[ReasonCode(first["code"])])
 
 
 def _level(robots: int, placed: int, merged: int) -> Level:

@@ -103,7 +103,7 @@ def _overlap(values: Mapping[str, Any]) -> str:
 def _wrong(report: Report) -> list[str]:
     """Say which robots are not merged and why, what jumped or was withdrawn, and how much was skipped."""
     found = [
-        f"**{cell(robot)}** is not merged: {paragraph(values['reason']['message'])}{_advice(values['reason']['code'])}"
+        f"**{cell(robot)}** is not merged: {_reason(values['reason'])}"
         for robot, values in report["robots"].items()
         if values["merged_from_map"] is None
     ]
@@ -119,10 +119,11 @@ def _wrong(report: Report) -> list[str]:
     return found
 
 
-def _advice(code: str) -> str:
-    """Return what may be done about it; it is our own text, with commands in backquotes."""
-    advice = ADVICE[ReasonCode(code)]
-    return f". *What to do:* {advice}" if advice else ""
+def _reason(reason: Mapping[str, str]) -> str:
+    """Return a reason in words, its code, and what may be done, in which commands are in backquotes."""
+    code = ReasonCode(reason["code"])
+    said = f"{paragraph(reason['message'])} (`{code}`)."
+    return f"{said} *What to do:* {ADVICE[code]}" if ADVICE[code] else said
 
 
 def _lately(said: Sequence[Said]) -> Iterator[str]:

@@ -175,6 +175,10 @@ class Narrator:
             )
         if late:
             self.say(f"{counted(late, 'message')} too late to be put in order of time: taken in on arrival")
+        placed = sum(row["merged_from_map"] is not None for row in report["robots"].values())
+        self.say(
+            f"{placed} of {counted(len(report['robots']), 'map')} {'is' if placed == 1 else 'are'} in the merged map"
+        )
         for line in what_to_do(report):
             self.say(line)
         spent_s = perf_counter() - self._begin_s
@@ -215,7 +219,7 @@ def what_to_do(report: Report) -> Iterator[str]:
         by_reason.setdefault(ReasonCode(row["reason"]["code"]), []).append(robot)
     for code, robots in by_reason.items():
         if ADVICE[code] and any(report["robots"][robot]["merged_from_map"] is None for robot in robots):
-            yield f"{listed(robots)}: {ADVICE[code]}"
+            yield f"{listed(robots)} ({code}): {ADVICE[code]}"
 
 
 def told(event: Merged, after: str) -> Iterator[str]:

@@ -121,6 +121,10 @@ def _head(path: Path) -> bytes:
 
 def _unknown(path: Path, head: bytes) -> str:
     if path.is_dir():
+        folders = sorted(each.parent.name for each in path.glob("*/metadata.yaml"))
+        if folders:
+            named = " ".join(str(path / each) for each in folders[:3])
+            return f"{path}: this folder is no ROS 2 bag, but holds some; give these, such as {named}"
         bags = sorted(each.name for each in path.iterdir() if each.suffix in {".bag", ".yaml", ".yml"})
         hint = f"; give one of its files, such as {path / bags[0]}" if bags else ""
         return f"{path}: this folder is no ROS 2 bag: neither metadata.yaml nor .db3 nor .mcap files are in it{hint}"

@@ -89,7 +89,7 @@ def test_require_all_counts_a_robot_without_a_map(replay: Program, tmp_path: Pat
         (("merge", "run.mcap", "--silent"), "did you mean --quiet?"),
         (("merge", "run.mcap", "--min-overlap", "4"), "did you mean --set merge.verify.min_overlap_m2=…?"),
         (("inspect", "run.mcap"), "did you mean info?"),
-        (("help",), "did you mean --help?"),
+        (("halp",), "there is no such command"),
         (("merge", "run.mcap", "--clock", "sundial"), "--clock: 'sundial' is none of header, log;"),
         (("merge", "run.mcap", "--images", "change"), "is none of none, changed, all; did you mean changed?"),
     ],
@@ -264,3 +264,8 @@ def test_what_others_call_it_is_called_something_here() -> None:
     assert set(synonyms.FLAGS.values()) <= flags
     assert set(synonyms.COMMANDS.values()) <= {*COMMANDS, "--help", "--version"}
     assert not set(synonyms.COMMANDS) & set(COMMANDS)
+
+
+def test_help_is_a_word_as_well(replay: Program) -> None:
+    assert replay("help").out == replay("--help").out
+    assert replay("help", "info").out == replay("info", "--help").out

@@ -29,6 +29,15 @@ def three(tmp_path: Path) -> Path:
 
 
 class TestChoice:
+    def test_a_name_that_is_nearly_right(self, replay: Program, two: Path) -> None:
+        assert "there is no map of robot 'R1'; did you mean 'r1'?" in replay.merge(two, "--robots", "R1,r2").error
+
+    def test_a_folder_of_bags(self, replay: Program, tmp_path: Path) -> None:
+        one = tmp_path / "bags" / "alpha"
+        one.mkdir(parents=True)
+        (one / "metadata.yaml").write_text("")
+        assert f"but holds some; give these, such as {one}" in replay.merge(one.parent).error
+
     def test_all_in_order_of_name_and_said(self, replay: Program, two: Path) -> None:
         ran = replay.merge(two)
         assert list(ran.robots) == ["r1", "r2"]
