@@ -39,6 +39,7 @@ def run(options: argparse.Namespace) -> int:
     """Print the script."""
     import shtab
 
+    from mapmerge.match import MATCHERS
     from replay.arguments import whole_parser
 
     program, commands = whole_parser()
@@ -46,6 +47,8 @@ def run(options: argparse.Namespace) -> int:
         for _, action in command.grouped():
             if action.type is Path or action.dest in _FILES:
                 action.complete = shtab.FILE  # type: ignore[attr-defined]  # as the library asks for
+            elif action.dest == "method":
+                action.choices = tuple(MATCHERS)
     with printing():
         sys.stdout.write(shtab.complete(program, options.shell) + "\n")
     return EXIT_DONE

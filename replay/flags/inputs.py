@@ -47,7 +47,7 @@ def add(parser: argparse.ArgumentParser, *config_names: str) -> None:
         "--start",
         metavar="TIME",
         help="begin at this time, with the last map before it: seconds after the first map, nanoseconds since 1970 "
-        "with ns, or ISO 8601, UTC unless it names a zone",
+        "with ns, or ISO 8601, UTC unless it names a zone; what is said of times, as +2.0 s, counts from there",
     )
     times.add_argument("--stop", metavar="TIME", help="use maps before this time")
     times.add_argument(
