@@ -145,7 +145,7 @@ class _Writer:
         self._plots.show(event.report, event.timing)
         self._statuses.show(event.report)
         self._say_waiting()
-        for entry in decisions(event.result):
+        for entry in (*decisions(event.result), *text.remarks(event)):
             self._say(entry)
         self._show_pages(event.report)
         self._lay_out_live()
