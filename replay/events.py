@@ -152,6 +152,8 @@ class Merged:
         Messages read so far, and in all.
     moved
         Where robots were since the tick before, where that was recorded and is wanted.
+    remarks
+        What is to be said of ``moved``, for who looks on; never part of a report.
     """
 
     stamp_ns: int
@@ -162,6 +164,7 @@ class Merged:
     done: int
     total: int
     moved: tuple[Moved, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -89,7 +89,8 @@ def events(plan: Plan, options: RunOptions, written: OutputOptions | None = None
             report.take(tick.stamp_ns, result, priors)
             done, stamp_ns = done + tick.messages, tick.stamp_ns
             moved = trajectories.until(stamp_ns)
-            yield Merged(stamp_ns, result, report.build(stamp_ns, result, inputs), pictures, timing, done, total, moved)
+            now = report.build(stamp_ns, result, inputs)
+            yield Merged(stamp_ns, result, now, pictures, timing, done, total, moved, trajectories.remarks())
     yield from _noted(report, beliefs.missed())
     final = report.build(stamp_ns, merger.result, plan.describe_inputs(tallies))
     if stamp_ns is None:

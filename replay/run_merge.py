@@ -83,9 +83,10 @@ class Run:
         shown = (ProgressSink(self._notes, self._talk), self.narrator)
         written = self._written
         if written is not None and self._is_shown:
-            from replay.viewer import open_live
+            from replay import viewer
 
-            written = replace(written, live_url=open_live())
+            written = replace(written, live_url=viewer.open_live())
+            viewer.import_silently()
         if written is not None:
             with open_sinks(written, shown, say=self.narrator.say) as sinks:
                 yield sinks

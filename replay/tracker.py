@@ -99,9 +99,7 @@ class Tracker:
         is_shared = list(self._frames.values()).count(frame) > 1
         if not own and (len(prefixes) != 1 or is_shared):
             return None
-        return min(
-            own or linked, key=lambda base: next(rank for rank, kind in enumerate(_BASES) if base.endswith(kind))
-        )
+        return min(own or linked, key=_rank)
 
 
 def _base_prefix(frame: str) -> str | None:
@@ -114,6 +112,7 @@ def _base_prefix(frame: str) -> str | None:
 
 
 def _rank(base: str) -> int:
+    """Return which kind of base a frame is, the one to be preferred first."""
     return next(rank for rank, kind in enumerate(_BASES) if base.endswith(kind))
 
 

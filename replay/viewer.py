@@ -23,6 +23,7 @@ _MCAP_MAGIC = b"\x89MCAP0\r\n"
 _HEAD_BYTES = 16
 _START_S = 30.0
 _POLL_S = 0.05
+_LIBRARY_LOG = "RUST_LOG"
 _NOBODY = f"http://{LOOPBACK}:9"  # nothing listens there
 
 
@@ -107,7 +108,6 @@ def open_live() -> str:
         If there is no screen, or the viewer does not start.
     """
     refuse_without_screen(INSTEAD_OF_LIVE)
-    os.environ.setdefault("RUST_LOG", "off")  # the library would print that its viewer was closed
     with socket.socket() as free:
         free.bind((LOOPBACK, 0))
         port = free.getsockname()[1]
@@ -122,6 +122,20 @@ def open_live() -> str:
         process.terminate()
         log.seek(0)
         raise OutputError(f"the viewer does not start: {_last_words(log.read())}")
+
+
+def import_silently() -> None:
+    """Import the library, if nobody did yet, so that it does not print on its own that its viewer was closed.
+
+    It asks the environment only as it is imported, which is then as it was.
+    """
+    is_said = _LIBRARY_LOG in os.environ
+    os.environ.setdefault(_LIBRARY_LOG, "off")
+    try:
+        import rerun  # noqa: F401 - for those who import it next
+    finally:
+        if not is_said:
+            del os.environ[_LIBRARY_LOG]
 
 
 def live_address(port: int) -> str:

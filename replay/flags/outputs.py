@@ -52,7 +52,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         choices=("none", "auto", "all"),
         default="auto",
         help="read from /tf where robots drove, to show it in the Rerun recording: of no recording, of those of up to "
-        "256 MiB and 100 000 messages of transforms, or of all, however long that takes (default: %(default)s)",
+        "64 MiB and 20 000 messages of transforms that are not compressed as files, or of all, however long that takes "
+        "(default: %(default)s)",
     )
     outputs.add_argument("--json", action="store_true", help="print the report instead of a table")
 

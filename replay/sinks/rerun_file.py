@@ -145,7 +145,7 @@ class _Writer:
         self._plots.show(event.report, event.timing)
         self._statuses.show(event.report)
         self._say_waiting()
-        for entry in decisions(event.result):
+        for entry in (*decisions(event.result), *text.remarks(event)):
             self._say(entry)
         self._show_pages(event.report)
         self._lay_out_live()
@@ -170,8 +170,7 @@ class _Writer:
                 self._show_page(self._robots[robot].candidates, candidates(event.report, pair))
 
     def _show_pages(self, report: Report) -> None:
-        robots, since_s = list(self._robots.values()), self._since_ns / NS_PER_S
-        self._show_page(SUMMARY, summary(report, robots, self._said, None if self._start_ns is None else since_s))
+        self._show_page(SUMMARY, summary(report, list(self._robots.values()), self._said))
         self._show_page(ROBOTS, text.robots_table(report))
         self._show_page(SKIPPED, text.skipped_table(report))
 

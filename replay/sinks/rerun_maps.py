@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,6 +71,7 @@ class MapScene:
         self._cells = cells
         self._shades = _shades()
         self._merged: Grid | None = None
+        self._laid_out: Mapping[str, RobotOutcome] | None = None
         self._shown = {entities.robot: _Shown() for entities in robots}
         self._walls = {entities.robot: WallScene(stream, entities, cells) for entities in robots}
         self._extent: Extent | None = None
@@ -92,6 +93,10 @@ class MapScene:
         for entities in self._robots:
             if entities.robot in result.updated:
                 self._show_map(entities, result.grids[entities.robot])
+        # the merger keeps what became of the robots where nothing new came
+        if result.robots is self._laid_out:
+            return
+        self._laid_out = result.robots
         corners_m = {robot: shown.corners_m for robot, shown in self._shown.items() if shown.corners_m is not None}
         places_m = {robot: shown.places_m for robot, shown in self._shown.items() if shown.places_m is not None}
         layout = lay_out(result, corners_m, places_m)

@@ -39,8 +39,10 @@ class Said:
         return f"+{self.since_s:.1f} s"
 
 
-def summary(report: Report, robots: Sequence[RobotEntities], said: Sequence[Said], since_s: float | None) -> str:
+def summary(report: Report, robots: Sequence[RobotEntities], said: Sequence[Said]) -> str:
     """Return the page as of now, in Markdown.
+
+    It does not say when that is, which the time line shows: so it stays the same while nothing happens.
 
     Parameters
     ----------
@@ -50,12 +52,8 @@ def summary(report: Report, robots: Sequence[RobotEntities], said: Sequence[Said
         The robots, the reference first.
     said
         The log so far.
-    since_s
-        How long after the first tick it is; None where there was none.
     """
-    parts = [f"# {_headline(report)}"]
-    if since_s is not None:
-        parts.append(f"after {since_s:.1f} s, in the map frame of **{cell(robots[0].robot)}**, the reference")
+    parts = [f"# {_headline(report)}", f"in the map frame of **{cell(robots[0].robot)}**, the reference"]
     parts.append(_table(report, robots))
     parts += ["### What went wrong", *_items(_wrong(report), "Nothing: no map was refused, nothing was skipped.")]
     parts += ["### Decisions", *_items(_lately(said), "None yet.")]

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from replay.decisions import INFO, WARN, Entry
-from replay.events import Noted, Report, Skipped
+from replay.events import Merged, Noted, Report, Skipped
 from replay.figures import NO_FIGURE, area, degrees, fixed, share
 from replay.plain_text import plain, plain_json
 from replay.words import lost
@@ -28,6 +28,11 @@ def skipped(event: Skipped) -> Entry:
 def noted(event: Noted) -> Entry:
     """Say what a reader should know."""
     return WARN, f"{event.robot}: {event.message}" if event.robot else event.message
+
+
+def remarks(event: Merged) -> Iterator[Entry]:
+    """Say what is only for who looks on."""
+    yield from ((WARN, remark) for remark in event.remarks)
 
 
 def outcome(report: Report) -> Iterator[Entry]:

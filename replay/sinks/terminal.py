@@ -232,6 +232,8 @@ def told(event: Merged, after: str) -> Iterator[str]:
         sure = "" if match.confidence is None else f" (confidence {share(match.confidence, 4)})"
         verdict = "accepted" if match.accepted else "refused"
         yield f"  {pair[1]} on {pair[0]} searched, as {trigger.words}: {verdict}{sure}: {match.reason.message}"
+    for remark in event.remarks:
+        yield f"  {remark}"
 
 
 def open_notes(colour: str = "auto") -> Console:

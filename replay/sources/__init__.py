@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Protocol, cast
+from typing import Protocol, cast, runtime_checkable
 
 from replay.errors import InputError
 from replay.sources.base import Source
@@ -53,6 +53,14 @@ class SourceClass(Protocol):
         """
 
 
+@runtime_checkable
+class Reopening(Protocol):
+    """A source of which something was made to read it by."""
+
+    def again(self) -> Source:
+        """Open what was made once more."""
+
+
 def open_source(path: Path, most_bytes: int | None = None) -> Source:
     """Open the recording at ``path``, whatever its name.
 
@@ -73,6 +81,22 @@ def open_source(path: Path, most_bytes: int | None = None) -> Source:
             if source.recognises(path, head):
                 return source(path, most_bytes=MOST_BYTES if most_bytes is None else most_bytes)
         raise InputError(_unknown(path, head))
+
+
+def reopened(source: Source, most_bytes: int | None = None) -> Source:
+    """Open a recording once more, to be read beside the first time; close it before that.
+
+    What it was decompressed to is not made anew.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read any more.
+    """
+    if isinstance(source, Reopening):
+        with translated(source.path):
+            return source.again()
+    return open_source(source.path, most_bytes)
 
 
 @contextmanager

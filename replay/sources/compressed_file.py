@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from replay.errors import InputError
@@ -38,7 +39,8 @@ class CompressedFile(Closing):
         self.path = path
         with ExitStack() as stack, translated(path, (*COMMON, ZstdError)):
             plain, is_whole = plain_copy(path, stack)
-            self._source = stack.enter_context(_opened(plain, path, most_bytes, is_whole=is_whole))
+            self._again = partial(_opened, plain, path, most_bytes, is_whole=is_whole)
+            self._source = stack.enter_context(self._again())
             if not is_whole:
                 name_early_end(self._source)
             self.losses = self._source.losses
@@ -49,6 +51,10 @@ class CompressedFile(Closing):
         """Tell whether this is compressed with zstd, whatever is in it."""
         del path
         return head.startswith(MAGIC)
+
+    def again(self) -> Source:
+        """Open the copy once more, for as long as this is open."""
+        return self._again()
 
     @property
     def info(self) -> SourceInfo:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
 
 from mapmerge.sim2 import Sim2
+from replay import trajectories
 from replay.codec import decode_transforms
+from replay.errors import InputError
 from replay.events import Event, Merged
 from replay.messages import FrameLink
 from replay.options import RunOptions, TrajectoryChoice
@@ -18,11 +21,14 @@ from replay.pipeline import merge
 from replay.plan import Plan
 from replay.pose3 import Pose3
 from replay.runs import RunPath
-from replay.sources import open_source
+from replay.sources import compressed_file, open_source
+from replay.sources.base import RawMessage
+from replay.thinned_transforms import Thinned
 from replay.tracker import MOST_POSES, STEP_M, Tracker
-from replay.trajectories import AUTO_BYTES, Thinned
+from replay.trajectories import AUTO_BYTES
 from tests.bags import SECOND, Recorded, write_mcap, write_rosbag1, write_rosbag2
 from tests.program import Program
+from tests.rrd import contents
 from tests.runs import growing, in_log_order, link, linked, two_robots
 
 FRAMES = {"r1": "r1/map"}
@@ -81,6 +87,91 @@ def test_nothing_is_read_unless_it_is_wanted(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(Plan, "input_bytes", lambda *_: AUTO_BYTES + 1)
     assert driven(replayed(path, "auto")) == {}
     assert set(driven(replayed(path, "all"))) == {"r1", "r2"}
+
+
+def test_many_transforms_are_read_only_when_that_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_mcap(tmp_path / "run.mcap", recorded())
+    monkeypatch.setattr(trajectories, "AUTO_MESSAGES", 80)
+    assert set(driven(replayed(path, "auto"))) == {"r1", "r2"}
+    monkeypatch.setattr(trajectories, "AUTO_MESSAGES", 79)
+    assert driven(replayed(path, "auto")) == {}
+    assert set(driven(replayed(path, "all"))) == {"r1", "r2"}
+
+
+def test_what_is_compressed_as_a_file_is_decompressed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = write_mcap(tmp_path / "run.mcap", recorded())
+    path = tmp_path / "run.mcap.zstd"
+    path.write_bytes(zstandard.ZstdCompressor().compress(plain.read_bytes()))
+    assert driven(replayed(path, "auto")) == {}
+    folder = write_rosbag2(tmp_path / "folder", recorded(), compression="file")
+    assert driven(replayed(folder, "auto")) == {}
+    times = []
+    decompress = compressed_file.decompress_file
+    monkeypatch.setattr(compressed_file, "decompress_file", lambda *known: times.append(known) or decompress(*known))
+    assert same(driven(replayed(path, "all")), driven(replayed(plain, "all")))
+    assert len(times) == 1
+
+
+@pytest.mark.parametrize("jobs", [2, 3])
+def test_it_is_the_same_with_several_jobs(jobs: int, tmp_path: Path) -> None:
+    many = in_log_order(recorded(), drives("r1", 2.0, speed_m=0.5), drives("r2", 7.0, speed_m=0.4))
+    path = write_mcap(tmp_path / "run.mcap", many)
+    alone, beside = (
+        [event.moved for event in replayed(path, jobs=count) if isinstance(event, Merged)] for count in (1, jobs)
+    )
+    assert len(alone) == len(beside)
+    for one, other in zip(alone, beside, strict=True):
+        assert [item.robot for item in one] == [item.robot for item in other]
+        assert all(np.array_equal(mine.poses, its.poses) for mine, its in zip(one, other, strict=True))
+
+
+def of_one_robot(path: Path, robot: str, first_s: float) -> Path:
+    return write_mcap(path, in_log_order(drives(robot), growing(robot, first_s, frame=f"{robot}/map")))
+
+
+def breaks_off(monkeypatch: pytest.MonkeyPatch, name: str, after: int) -> None:
+    """Let a recording be one that cannot be read on when its transforms are looked at."""
+
+    def messages(self: Thinned, topics: Collection[str]) -> Iterator[RawMessage]:
+        for index, raw in enumerate(whole(self, topics)):
+            if index == after and self.path.name == name:
+                raise InputError(f"{name}: it is gone")
+            yield raw
+
+    whole = Thinned.messages
+    monkeypatch.setattr(Thinned, "messages", messages)
+
+
+def test_one_recording_that_cannot_be_read_on_is_one_remark(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paths = [of_one_robot(tmp_path / "a.mcap", "r1", 0.0), of_one_robot(tmp_path / "b.mcap", "r2", 2.0)]
+    options = RunOptions(tuple(RunPath(None, path) for path in paths), trajectories="all")
+    whole = driven(list(merge(options)))
+    program, outputs = Program(capsys, tmp_path), {}
+    breaks_off(monkeypatch, "a.mcap", 30)
+    events = list(merge(options))
+    assert np.array_equal(driven(events)["r2"], whole["r2"])
+    begun = driven(events)["r1"]
+    assert 10 < len(begun) <= 30
+    assert np.array_equal(begun, whole["r1"][: len(begun)])
+    said = "where robots drove is not read on from a.mcap: a.mcap: it is gone"
+    assert [remark for event in events if isinstance(event, Merged) for remark in event.remarks] == [said]
+    for choice in ("none", "all"):
+        output = tmp_path / choice / "out.mcap"
+        output.parent.mkdir()
+        done = program("merge", *paths, "-o", output, "--images", "none", "--trajectories", choice, "-v", "--strict")
+        assert done.status == 0
+        assert done.err.count(said) == (choice == "all")
+        rows = str([each for each in contents(output.with_suffix(".rrd")) if each[0] == "/decisions"])
+        assert rows.count(said) == (choice == "all")
+        outputs[choice] = [output.with_suffix(suffix).read_bytes() for suffix in (".mcap", ".json")]
+    assert outputs["none"] == outputs["all"]
+    assert said not in program("merge", *paths, "-o", tmp_path / "usual.mcap", "--trajectories", "all").err
+
+
+def same(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> bool:
+    return set(one) == set(other) and all(np.array_equal(poses, other[robot]) for robot, poses in one.items())
 
 
 def test_damaged_transforms_change_nothing(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
