@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from replay.checks.findings import Finding
     from replay.events import Report
+    from replay.options import OutputOptions
     from replay.run_result import RunResult
 
 USAGE = "RUN [RUN ...] --expect EXPECT.yaml [options]"
@@ -48,6 +50,7 @@ exit status: 0 all is as expected, or the expectation is written; 1 something is
 3 an output could not be written, or a bug; 130 interrupted
 """
 
+_SAVED_MAPS = (".yaml", ".yml")
 _OF_A_MERGE = (
     *("--config", "--set"),
     *("--output", "--report", "--robots", "--topic", "--start", "--stop"),
@@ -111,10 +114,10 @@ def _check(options: argparse.Namespace) -> int:
 
 def _write_expectation(options: argparse.Namespace) -> int:
     from replay.checks.write_expectation import expectation_text
-    from replay.written_files import refuse_files, write_files
+    from replay.written_files import write_files
 
     path: Path = options.write_expect
-    refuse_files([path], _inputs(options), force=options.force)
+    _refuse_files(options)
     result, _ = _result(options)
     write_files({path: expectation_text(result).encode()}, force=options.force)
     say(f"replay: wrote {path}; look at it, and give it with --expect")
@@ -141,11 +144,10 @@ def _merged(options: argparse.Namespace) -> Report:
     from replay.run_merge import Run
     from replay.sinks import output_paths
 
-    is_written = options.output is not None or options.report is not None
-    if not is_written:
+    written = _written(options)
+    if written is None:
         options.images = "none"
     run_options = inputs.run_options(options)
-    written = outputs.output_options(options, run_options) if is_written else None
     merging = Run(run_options, written, talk.of(options), options.color, is_shown=options.view)
     options.is_published = lambda: written is not None and merging.narrator.is_published
     report = merging.merge()
@@ -154,21 +156,42 @@ def _merged(options: argparse.Namespace) -> Report:
     return report
 
 
+def _written(options: argparse.Namespace) -> OutputOptions | None:
+    """Return what is written of the run; None for nothing."""
+    if options.output is None and options.report is None:
+        return None
+    return outputs.output_options(options, inputs.run_options(options))
+
+
 def _inputs(options: argparse.Namespace) -> list[Path]:
+    """Return what is read, with the images of saved maps."""
     from replay.runs import RunPath
+    from replay.sources import open_source
 
     paths = [RunPath.parse(text).path for text in options.runs]
-    return [*paths, *([options.expect] if options.expect is not None else [])]
+    for path in [each for each in paths if each.suffix in _SAVED_MAPS]:
+        with suppress(ReplayError), open_source(path) as source:  # what cannot be read is refused when it is merged
+            paths += source.files
+    return [*paths, *(path for path in (options.expect, options.config) if path is not None)]
 
 
 def _refuse_files(options: argparse.Namespace) -> None:
-    """Refuse files that could not be written in the end."""
-    from replay.written_files import refuse_files
+    """Refuse files that could not be written in the end, or would replace what is read or what else is written."""
+    from replay.outputs import refuse_alike, refuse_inputs
+    from replay.sinks import reserved_paths
+    from replay.written_files import refuse_files, reserved_names
 
     if options.summary == "":
         raise UsageError('--summary: the name is empty; is the variable set, as "$GITHUB_STEP_SUMMARY" is in a job?')
-    paths = [path for path in (options.junit, Path(options.summary) if options.summary else None) if path is not None]
-    refuse_files(paths, _inputs(options), force=True)
+    summary = Path(options.summary) if options.summary else None
+    paths = [path for path in (options.write_expect, options.junit) if path is not None]
+    appended = [summary] if summary is not None else []
+    refuse_files([*paths, *appended], _inputs(options), force=options.force or options.write_expect is None)
+    written = _written(options)
+    if written is not None:
+        if options.expect is not None:
+            refuse_inputs(reserved_paths(written), [options.expect])
+        refuse_alike([reserved_paths(written), *map(reserved_names, paths), appended])
 
 
 def _write_findings(found: Sequence[Finding], options: argparse.Namespace) -> None:

@@ -336,3 +336,42 @@ def test_help_has_the_words_of_an_expectation() -> None:
     ran = in_process_of_its_own("check", "--help")
     assert "--write-expect" in ran.stdout
     assert "exit status: 0" in ran.stdout
+
+
+@pytest.mark.parametrize(
+    "flags",
+    [
+        ("-o", "out.mcap", "--junit", "out.json"),
+        ("-o", "out.mcap", "--junit", "./out.rrd"),
+        ("-o", "out.mcap", "--junit", "out.mcap.partial"),
+        ("--report", "out.html", "--summary", "out.html"),
+        ("--junit", "same", "--summary", "same"),
+        ("--junit", "same", "--summary", "same.partial"),
+        ("-o", "out.mcap", "--junit", "linked.json"),
+    ],
+)
+def test_outputs_that_would_replace_each_other_are_refused(replay: Program, two: Path, flags: tuple[str, ...]) -> None:
+    (replay.folder / "out.json").write_text("before", encoding="utf-8")
+    (replay.folder / "linked.json").hardlink_to(replay.folder / "out.json")
+    ran = checked(replay, two, "robots: {r1: reference}", *flags, "--force")
+    assert ran.status == 2
+    assert "is taken by another output" in ran.error
+    assert sorted(path.name for path in replay.folder.iterdir()) == ["expect.yaml", "linked.json", "out.json"]
+    assert (replay.folder / "out.json").read_text(encoding="utf-8") == "before"
+
+
+def test_an_expectation_is_not_written_over_the_run_nor_the_run_over_it(replay: Program, two: Path) -> None:
+    ran = replay("check", two, "-o", "out.mcap", "--write-expect", "out.json")
+    assert (ran.status, "is taken by another output" in ran.error) == (2, True)
+    (replay.folder / "out.json").write_text("robots: {r1: reference}", encoding="utf-8")
+    ran = replay("check", two, "-o", "out.mcap", "--expect", "out.json", "--force")
+    assert (ran.status, "is an input" in ran.error) == (2, True)
+    assert [path.name for path in replay.folder.iterdir()] == ["out.json"]
+
+
+def test_the_image_of_a_saved_map_is_an_input(replay: Program, outcome: Path) -> None:
+    assert replay("export", outcome, "-o", "old").status == 0
+    before = (replay.folder / "old.pgm").read_bytes()
+    ran = checked(replay, replay.folder / "old.yaml", "robots: {old: reference}", "--junit", "old.pgm")
+    assert (ran.status, "is an input" in ran.error) == (2, True)
+    assert (replay.folder / "old.pgm").read_bytes() == before
