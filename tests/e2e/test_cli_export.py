@@ -22,8 +22,19 @@ from replay.sources import open_source
 from tests.bags import write_mcap, write_saved_map
 from tests.data_paths import ROOT
 from tests.outputs import maps
-from tests.program import Program
-from tests.runs import RESOLUTION_M, at, bare_room, flat_map, in_log_order, reference_from, seen, two_robots, updated
+from tests.program import Program, Ran
+from tests.runs import (
+    RESOLUTION_M,
+    at,
+    bare_room,
+    flat_map,
+    growing,
+    in_log_order,
+    reference_from,
+    seen,
+    two_robots,
+    updated,
+)
 
 MAP_SAVER = {"free": 254, "occupied": 0, "unknown": 205}
 
@@ -304,3 +315,56 @@ def test_what_is_no_recording_is_refused(replay: Program, content: bytes) -> Non
     (replay.folder / "bad.mcap").write_bytes(content)
     assert replay("export", "bad.mcap").error.startswith("bad.mcap: ")
     assert replay("export", "bad.mcap", "--to", "tf").error.startswith("bad.mcap: ")
+
+
+def test_maps_are_taken_of_what_was_merged_alone(replay: Program, tmp_path: Path) -> None:
+    for folder, robot in (("a", "r1"), ("b", "r2"), ("c", "r2")):
+        (tmp_path / folder).mkdir()
+        last = flat_map(robot) if folder != "c" else bare_room()
+        write_mcap(
+            tmp_path / folder / "run.mcap", [*growing(robot, topic="/map"), seen(robot, 40.0, last, topic="/map")]
+        )
+    one, other, third = (tmp_path / folder / "run.mcap" for folder in "abc")
+    out = replay.merge(f"r1={one}", f"r2={other}").mcap
+
+    def exported(*runs: str, file: Path = out, robots: str = "r2", flags: tuple[str, ...] = ()) -> Ran:
+        maps_of = [flag for run in runs for flag in ("--maps", run)]
+        return replay("export", file, "--robots", robots, *maps_of, "--mode", "raw", "--force", *flags)
+
+    assert "run.mcap was merged as well" in exported(f"r2={other}").error
+    assert "is not the recording that was merged: it has " in exported(f"r1={one}", f"r2={third}").error
+    assert "is not the recording that was merged" in exported(f"r2={one}", f"r1={other}").error
+    assert "r3" in exported(f"r1={one}", f"r3={other}").error
+    for file in (out, out.with_suffix(".json")):
+        ran = exported(f"r2={other}", f"r1={one}", file=file)
+        assert (ran.status, ran.out) == (0, ""), ran.err
+        assert "digests" not in ran.err
+    assert exported(f"r1={one}", f"r2={other}", flags=("--at", "12")).status == 0
+
+
+@pytest.mark.parametrize("flags", [(), ("--at", "12")])
+def test_a_recording_of_the_same_size_with_other_maps_is_refused(
+    replay: Program, two: Path, tmp_path: Path, flags: tuple[str, ...]
+) -> None:
+    (tmp_path / "other").mkdir()
+    content = bytearray(write_mcap(tmp_path / "other" / two.name, two_robots(), compression="none").read_bytes())
+    plain = write_mcap(tmp_path / two.name, two_robots(), compression="none")
+    out = replay.merge(plain).mcap
+    cells = flat_map("r2", 9.0).cells.tobytes()
+    at_byte = content.index(cells) + cells.index(b"\x64")
+    content[at_byte] = 0x32
+    other = tmp_path / "other" / two.name
+    other.write_bytes(content)
+    ran = replay("export", out, "--robots", "r2", "--maps", other, *flags)
+    assert ran.status == 2
+    assert "its maps have another digest" in ran.err
+    assert replay("export", out, "--robots", "r2", "--maps", plain, *flags).status == 0
+
+
+@pytest.mark.parametrize("flags", [("--start", "5"), ("--stop", "11"), ("--start", "5", "--stop", "15")])
+def test_maps_of_a_part_of_a_recording_are_those_of_that_part(
+    replay: Program, two: Path, flags: tuple[str, ...]
+) -> None:
+    out = replay.merge(two, *flags).mcap
+    assert replay("export", out, "--robots", "r1", "--maps", two, "--mode", "raw", "-o", "r1").status == 0
+    assert (loaded(replay.folder / "r1.yaml").cells >= 0).any()

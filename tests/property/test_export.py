@@ -75,7 +75,7 @@ def results(draw: st.DrawFn) -> RunResult:
     }
     robots = {"r1": robot("r1", "reference", IDENTITY, draw(shares), None), **robots}
     skipped = draw(st.dictionaries(st.sampled_from(["damaged", "empty"]), st.integers(1, 9)))
-    return RunResult(Path("run.json"), "r1", robots, skipped, "1", {}, {})
+    return RunResult(Path("run.json"), "r1", robots, skipped, "1", {}, ())
 
 
 @given(results())
