@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mapmerge.reasons import ReasonCode
 from mapmerge.sim2 import Sim2
 from replay.documents import Node
 from replay.events import Report
 
 STATUSES = ("reference", "merged", "unmerged", "no_map")
+_REASONS = tuple(str(code) for code in ReasonCode)
 _PLACED = ("reference", "merged")
 MOST_SCALE = 1e6
 
@@ -153,7 +155,7 @@ def _robot(robot: str, node: Node, first_ns: int | None) -> RobotResult:
     return RobotResult(
         robot,
         status.text(),
-        node.need("reason").need("code").text(),
+        _reason(node.need("reason").need("code")),
         node.need("reason").need("message").text(),
         pose,
         node.maybe("acceptance", Node.number),
@@ -163,6 +165,12 @@ def _robot(robot: str, node: Node, first_ns: int | None) -> RobotResult:
         node.need("map_frame").text(),
         node.need("map_topic").text(),
     )
+
+
+def _reason(node: Node) -> str:
+    if node.value not in _REASONS:
+        node.refuse(f"one of {', '.join(_REASONS)}")
+    return node.text()
 
 
 def _inputs(node: Node) -> tuple[RunInput, ...]:

@@ -368,3 +368,27 @@ def test_maps_of_a_part_of_a_recording_are_those_of_that_part(
     out = replay.merge(two, *flags).mcap
     assert replay("export", out, "--robots", "r1", "--maps", two, "--mode", "raw", "-o", "r1").status == 0
     assert (loaded(replay.folder / "r1.yaml").cells >= 0).any()
+
+
+def test_comments_stay_comments_whatever_names_are_in_them(replay: Program, outcome: Path) -> None:
+    report = json.loads(outcome.with_suffix(".json").read_text(encoding="utf-8"))
+    evil = "r2\ntouch pwned\r\x1b[2J"
+    found = report["robots"].pop("r2")
+    report["robots"][evil] = {**found, "status": "unmerged", "merged_from_map": None}
+    report["robots"][evil]["reason"] = {"code": "ambiguous", "message": evil}
+    report["reference"] = evil
+    path = replay.folder / "a\ntouch pwned.json"
+    path.write_text(json.dumps(report), encoding="utf-8")
+    ran = replay("export", path, "--to", "tf")
+    assert (ran.status, ran.err) == (0, "")
+    lines = ran.out.split("\n")
+    assert [line[:2] for line in lines] == ["# ", "ro", "# ", ""]
+    assert "".join(lines).isprintable()
+
+
+def test_a_reason_that_there_is_not_is_refused(replay: Program, outcome: Path) -> None:
+    report = json.loads(outcome.with_suffix(".json").read_text(encoding="utf-8"))
+    report["robots"]["r2"]["reason"]["code"] = "x\ntouch pwned"
+    (replay.folder / "bad.json").write_text(json.dumps(report), encoding="utf-8")
+    error = replay("export", "bad.json", "--to", "tf").error
+    assert "robots.r2.reason.code is 'x\\ntouch pwned'; expected one of reference, accepted" in error
