@@ -392,3 +392,19 @@ def test_a_reason_that_there_is_not_is_refused(replay: Program, outcome: Path) -
     (replay.folder / "bad.json").write_text(json.dumps(report), encoding="utf-8")
     error = replay("export", "bad.json", "--to", "tf").error
     assert "robots.r2.reason.code is 'x\\ntouch pwned'; expected one of reference, accepted" in error
+
+
+@pytest.mark.parametrize(
+    ("target", "name"),
+    [
+        *((target, name) for target in ("map_server", "tf") for name in ("", ".", "..", "/", "there", "there/..")),
+        ("map_server", ".yaml"),
+        ("png", "there/.png"),
+    ],
+)
+def test_a_name_that_no_file_can_have_is_refused(replay: Program, outcome: Path, target: str, name: str) -> None:
+    (replay.folder / "there").mkdir()
+    ran = replay("export", outcome, "--to", target, "-o", name)
+    assert ran.status == 2
+    assert "expected a name of files, such as " in ran.error
+    assert [path.name for path in replay.folder.rglob("*")] == ["there"]
