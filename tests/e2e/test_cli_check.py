@@ -375,3 +375,18 @@ def test_the_image_of_a_saved_map_is_an_input(replay: Program, outcome: Path) ->
     ran = checked(replay, replay.folder / "old.yaml", "robots: {old: reference}", "--junit", "old.pgm")
     assert (ran.status, "is an input" in ran.error) == (2, True)
     assert (replay.folder / "old.pgm").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{{image: old.pgm, resolution: 0.1, origin: [0, 0, 0], {rest}}}",
+        '{{"image": "old.pgm", "resolution": 0.1, "origin": [0, 0, 0], {rest}}}',
+    ],
+)
+def test_a_saved_map_in_braces_is_no_report(replay: Program, outcome: Path, text: str) -> None:
+    assert replay("export", outcome, "-o", "old").status == 0
+    rest = '"negate": 0, "occupied_thresh": 0.65, "free_thresh": 0.196'
+    (replay.folder / "old.yaml").write_text(text.format(rest=rest), encoding="utf-8")
+    ran = checked(replay, replay.folder / "old.yaml", "robots: {old: reference}")
+    assert ran.status == 0, ran.err
