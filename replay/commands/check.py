@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from replay.errors import OutputError, ReplayError, UsageError
+from replay.errors import InputError, OutputError, ReplayError, UsageError
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE, interrupted_late
 from replay.flags import inputs, outputs, placing, rules, talk
 from replay.standard_streams import printing, say, takes
@@ -51,11 +51,8 @@ exit status: 0 all is as expected, or the expectation is written; 1 something is
 """
 
 _SAVED_MAPS = (".yaml", ".yml")
-_OF_A_MERGE = (
-    *("--config", "--set"),
-    *("--output", "--report", "--robots", "--topic", "--start", "--stop"),
-    *("--align-starts", "--init-pose", "--use-tf", "--strict"),
-)
+_OF_NO_MERGE = ("positional arguments", "what is expected", "what is said")
+"""The groups of flags that say something of a run that was made before."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -86,6 +83,7 @@ def run(options: argparse.Namespace) -> int:
         raise UsageError("give either --expect EXPECT.yaml or --write-expect EXPECT.yaml")
     if options.write_expect is not None and (options.junit or options.summary):
         raise UsageError("--junit and --summary tell what is expected: give them with --expect")
+    _refuse_useless(options)
     try:
         return _write_expectation(options) if options.write_expect is not None else _check(options)
     except KeyboardInterrupt:
@@ -131,13 +129,31 @@ def _result(options: argparse.Namespace) -> tuple[RunResult, Report]:
 
     path = Path(options.runs[0]) if options.runs else Path()  # without one, the error is that of any command
     if len(options.runs) == 1 and holds_report(path):
-        useless = [flag for flag in _OF_A_MERGE if getattr(options, flag.removeprefix("--").replace("-", "_"))]
-        if useless:
-            raise UsageError(f"{', '.join(useless)}: {path} is a run that was made before: nothing is merged")
         report = read_report(path)
         return RunResult.of(report, path), report
     report = _merged(options)
     return RunResult.of(report, path), report
+
+
+def _refuse_useless(options: argparse.Namespace) -> None:
+    """Refuse flags that say how to merge, or what to write of that, where nothing is merged."""
+    from replay.arguments import command_parser
+    from replay.report_file import holds_report
+
+    try:
+        if len(options.runs) != 1 or not holds_report(Path(options.runs[0])):
+            return
+    except InputError:  # what cannot be read is refused where it is read
+        return
+    served = "json" if options.write_expect is None else "force"
+    useless = [
+        action.option_strings[-1]
+        for title, action in command_parser("check").grouped()
+        if title not in _OF_NO_MERGE and action.dest in options.given and action.dest != served
+    ]
+    if useless:
+        run = options.runs[0]
+        raise UsageError(f"{', '.join(useless)}: {run} is a run that was made before: nothing is merged")
 
 
 def _merged(options: argparse.Namespace) -> Report:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from junitparser import JUnitXml
 
+from replay.arguments import command_parser
 from tests.bags import write_mcap
 from tests.program import Program, Ran, in_process_of_its_own
 from tests.runs import bare_room, in_log_order, reference_from, seen, two_robots
@@ -134,8 +135,27 @@ def test_a_run_that_was_made_before_is_not_made_again(replay: Program, outcome: 
     for run in (outcome, outcome.with_suffix(".json")):
         ran = checked(replay, run, "robots: {r2: merged}")
         assert (ran.status, ran.err) == (0, "")
-    for flags in (("-o", "new.mcap"), ("--robots", "r1,r2"), ("--init-pose", "r2=0,0,0")):
-        assert "nothing is merged" in checked(replay, outcome, "robots: {r2: merged}", *flags).error
+    (replay.folder / "settings.toml").write_text("", encoding="utf-8")
+    given = [flag for flag in _flags_of_a_merge() if flag.split()[0] not in ("--json", "--config")]
+    assert {"--min-confidence", "--method", "--max-memory", "--clock", "--output"} <= {
+        flag.split()[0] for flag in given
+    }
+    for flag in (*given, "--config settings.toml"):
+        ran = checked(replay, outcome, "robots: {r2: merged}", *flag.split())
+        assert ran.error.startswith(f"{flag.split()[0]}: "), flag
+        assert "nothing is merged" in ran.error
+
+
+def _flags_of_a_merge() -> list[str]:
+    """Return all flags of how to merge and what to write, each with a value that it takes."""
+    values = {"--clock": "log", "--set": "merge.scale=any"}
+    others = ("options", "what is expected", "what is said")
+    return [
+        action.option_strings[-1]
+        + ("" if action.nargs == 0 else f" {values.get(action.option_strings[-1], (action.choices or '1')[0])}")
+        for title, action in command_parser("check").grouped()
+        if action.option_strings and title not in others
+    ]
 
 
 def test_outputs_are_written_where_they_are_asked_for(replay: Program, two: Path) -> None:
@@ -390,3 +410,10 @@ def test_a_saved_map_in_braces_is_no_report(replay: Program, outcome: Path, text
     (replay.folder / "old.yaml").write_text(text.format(rest=rest), encoding="utf-8")
     ran = checked(replay, replay.folder / "old.yaml", "robots: {old: reference}")
     assert ran.status == 0, ran.err
+
+
+def test_of_a_recording_that_cannot_be_read_no_flag_is_blamed(replay: Program, tmp_path: Path) -> None:
+    (tmp_path / "bad.mcap").write_bytes(b"\x89MCAP0\r\n" + b"\xff" * 99)
+    ran = checked(replay, tmp_path / "bad.mcap", "robots: {r1: reference}", "--method", "paper")
+    assert ran.status == 2
+    assert ran.error.startswith(f"{tmp_path / 'bad.mcap'}: ")
