@@ -75,6 +75,8 @@ class Parser(argparse.ArgumentParser):
     def parsed(self, arguments: Sequence[str]) -> argparse.Namespace:
         """Return what a command line says, and for the rest what a file of settings says that it names, or the default.
 
+        ``given`` is what the command line itself says, of commands that take settings.
+
         Raises
         ------
         UsageError
@@ -94,7 +96,7 @@ class Parser(argparse.ArgumentParser):
 
             chosen = chosen_by(self, given)
         defaults = {name: self.get_default(name) for name in said}
-        return argparse.Namespace(**{**defaults, **chosen, **given})
+        return argparse.Namespace(**{**defaults, **chosen, **given}, given=frozenset(given))
 
     def _meant(self, message: str) -> str:
         """Return which flags may have been meant instead of those that there are not."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from decimal import Decimal
 from typing import Any
 
 from mapmerge.rounding import rounded_down
@@ -57,3 +58,9 @@ def size(count_bytes: int) -> str:
             return f"{value:.0f} {unit}" if unit == "bytes" else f"{value:.1f} {unit}"
         value /= 1000.0
     return f"{value:.1f} GB"
+
+
+def exact(value: float) -> str:
+    """Return a number that is read back as the same one, with a point and without an exponent: any YAML has it so."""
+    text = f"{Decimal(repr(value)):f}"
+    return text if "." in text else f"{text}.0"

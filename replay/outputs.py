@@ -38,6 +38,24 @@ def refuse_inputs(paths: Iterable[Path], inputs: Sequence[Path]) -> None:
             raise UsageError(f"{path} is an input, or would be written into one; give another name with --output")
 
 
+def refuse_alike(outputs: Sequence[Sequence[Path]]) -> None:
+    """Refuse outputs that would replace each other, by whatever link.
+
+    Parameters
+    ----------
+    outputs
+        Of each output, or of each set of them that goes together, all names that it takes.
+    """
+    taken: dict[Path | _Identity, Path] = {}
+    for paths in outputs:
+        for path in paths:
+            for key in (_resolved(path, OutputError), _identity(path)):
+                if key is not None and key in taken:
+                    raise UsageError(f"{path} is taken by another output, {taken[key]}; give another name")
+        for path in paths:
+            taken |= {key: path for key in (_resolved(path, OutputError), _identity(path)) if key is not None}
+
+
 def refuse_unwritable(path: Path) -> None:
     """Refuse a name that no file can have."""
     with path_errors(path, OutputError):

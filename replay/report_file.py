@@ -79,7 +79,8 @@ def holds_report(path: Path) -> bool:
     if head.startswith(MAGIC):
         with _ReportFile(path) as file:
             return any(topic.name == REPORT_TOPIC for topic in file.info.topics)
-    return head.lstrip().startswith(b"{")
+    # a saved map may be YAML in braces
+    return head.lstrip().startswith(b"{") and (b'"schema"' in head or path.suffix == ".json")
 
 
 def _head(path: Path) -> bytes:

@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mapmerge.reasons import ReasonCode
 from mapmerge.sim2 import Sim2
 from replay.documents import Node
 from replay.events import Report
 
 STATUSES = ("reference", "merged", "unmerged", "no_map")
+_REASONS = tuple(str(code) for code in ReasonCode)
 _PLACED = ("reference", "merged")
 MOST_SCALE = 1e6
 
@@ -56,6 +58,28 @@ class RobotResult:
 
 
 @dataclass(frozen=True, slots=True)
+class RunInput:
+    """A recording that was read.
+
+    Parameters
+    ----------
+    name
+        Of the file or folder; several may have the same.
+    size_bytes
+        None where nothing tells.
+    robots
+        Whose maps it holds, in order of name.
+    sha256
+        Digest of what was used of it; "" where not all was read.
+    """
+
+    name: str
+    size_bytes: int | None
+    robots: tuple[str, ...]
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
 class RunResult:
     """What came of a run.
 
@@ -71,8 +95,8 @@ class RunResult:
         Messages that were not used, by cause.
     version, settings
         What made the report, and with which settings.
-    digests
-        Digests of the inputs, by name.
+    inputs
+        The recordings, in the order in which they were given.
     stamp_ns
         As of when this is; None if there was no map at all.
     """
@@ -83,7 +107,7 @@ class RunResult:
     skipped: Mapping[str, int]
     version: str
     settings: Mapping[str, Any]
-    digests: Mapping[str, str]
+    inputs: tuple[RunInput, ...]
     stamp_ns: int | None = None
 
     @staticmethod
@@ -104,7 +128,7 @@ class RunResult:
             {cause: item.whole() for cause, item in node.need("skipped").items()},
             node.need("version").text(),
             {key: item.value for key, item in node.need("settings").items()},
-            _digests(node),
+            _inputs(node),
             node.maybe("stamp_ns", Node.whole),
         )
 
@@ -131,7 +155,7 @@ def _robot(robot: str, node: Node, first_ns: int | None) -> RobotResult:
     return RobotResult(
         robot,
         status.text(),
-        node.need("reason").need("code").text(),
+        _reason(node.need("reason").need("code")),
         node.need("reason").need("message").text(),
         pose,
         node.maybe("acceptance", Node.number),
@@ -143,9 +167,23 @@ def _robot(robot: str, node: Node, first_ns: int | None) -> RobotResult:
     )
 
 
-def _digests(node: Node) -> dict[str, str]:
+def _reason(node: Node) -> str:
+    if node.value not in _REASONS:
+        node.refuse(f"one of {', '.join(_REASONS)}")
+    return node.text()
+
+
+def _inputs(node: Node) -> tuple[RunInput, ...]:
     inputs = node.need("inputs").value
     if not isinstance(inputs, list):
         node.need("inputs").refuse("a list")
     items = [Node(node.file, item, ("inputs", at)) for at, item in enumerate(inputs)]
-    return {item.need("name").text(): item.maybe("sha256", Node.text) or "" for item in items}
+    return tuple(
+        RunInput(
+            item.need("name").text(),
+            item.maybe("size_bytes", Node.whole),
+            item.maybe("robots", Node.texts) or (),
+            item.maybe("sha256", Node.text) or "",
+        )
+        for item in items
+    )

@@ -8,9 +8,14 @@ from pathlib import Path
 
 from replay.errors import UsageError
 from replay.interrupts import held_off
-from replay.outputs import refuse_inputs, refuse_unwritable
+from replay.outputs import refuse_alike, refuse_inputs, refuse_unwritable
 from replay.sinks.partial_file import PartialFile, output_errors, partial_name
 from replay.sinks.publication import aside_name, publish
+
+
+def reserved_names(path: Path) -> tuple[Path, ...]:
+    """Return all names that may be written or removed for one file: also the temporary one, and that of the old one."""
+    return path, partial_name(path), aside_name(path)
 
 
 def refuse_files(paths: Sequence[Path], inputs: Sequence[Path], *, force: bool) -> None:
@@ -21,7 +26,9 @@ def refuse_files(paths: Sequence[Path], inputs: Sequence[Path], *, force: bool) 
     ReplayError
         With the reason.
     """
-    refuse_inputs([name(path) for path in paths for name in (Path, partial_name, aside_name)], inputs)
+    reserved = [reserved_names(path) for path in paths]
+    refuse_inputs([name for names in reserved for name in names], inputs)
+    refuse_alike(reserved)
     existing = [str(path) for path in paths if os.path.lexists(path)]
     if existing and not force:
         raise UsageError(f"there is already {', '.join(existing)}; give --force to replace, or another name")

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from replay.errors import OutputError, ReplayError, UsageError
+from replay.errors import InputError, OutputError, ReplayError, UsageError
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE, interrupted_late
 from replay.flags import inputs, outputs, placing, rules, talk
 from replay.standard_streams import printing, say, takes
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from replay.checks.findings import Finding
     from replay.events import Report
+    from replay.options import OutputOptions
     from replay.run_result import RunResult
 
 USAGE = "RUN [RUN ...] --expect EXPECT.yaml [options]"
@@ -48,11 +50,9 @@ exit status: 0 all is as expected, or the expectation is written; 1 something is
 3 an output could not be written, or a bug; 130 interrupted
 """
 
-_OF_A_MERGE = (
-    *("--config", "--set"),
-    *("--output", "--report", "--robots", "--topic", "--start", "--stop"),
-    *("--align-starts", "--init-pose", "--use-tf", "--strict"),
-)
+_SAVED_MAPS = (".yaml", ".yml")
+_OF_NO_MERGE = ("positional arguments", "what is expected", "what is said")
+"""The groups of flags that say something of a run that was made before."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -83,6 +83,7 @@ def run(options: argparse.Namespace) -> int:
         raise UsageError("give either --expect EXPECT.yaml or --write-expect EXPECT.yaml")
     if options.write_expect is not None and (options.junit or options.summary):
         raise UsageError("--junit and --summary tell what is expected: give them with --expect")
+    _refuse_useless(options)
     try:
         return _write_expectation(options) if options.write_expect is not None else _check(options)
     except KeyboardInterrupt:
@@ -111,10 +112,10 @@ def _check(options: argparse.Namespace) -> int:
 
 def _write_expectation(options: argparse.Namespace) -> int:
     from replay.checks.write_expectation import expectation_text
-    from replay.written_files import refuse_files, write_files
+    from replay.written_files import write_files
 
     path: Path = options.write_expect
-    refuse_files([path], _inputs(options), force=options.force)
+    _refuse_files(options)
     result, _ = _result(options)
     write_files({path: expectation_text(result).encode()}, force=options.force)
     say(f"replay: wrote {path}; look at it, and give it with --expect")
@@ -128,24 +129,41 @@ def _result(options: argparse.Namespace) -> tuple[RunResult, Report]:
 
     path = Path(options.runs[0]) if options.runs else Path()  # without one, the error is that of any command
     if len(options.runs) == 1 and holds_report(path):
-        useless = [flag for flag in _OF_A_MERGE if getattr(options, flag.removeprefix("--").replace("-", "_"))]
-        if useless:
-            raise UsageError(f"{', '.join(useless)}: {path} is a run that was made before: nothing is merged")
         report = read_report(path)
         return RunResult.of(report, path), report
     report = _merged(options)
     return RunResult.of(report, path), report
 
 
+def _refuse_useless(options: argparse.Namespace) -> None:
+    """Refuse flags that say how to merge, or what to write of that, where nothing is merged."""
+    from replay.arguments import command_parser
+    from replay.report_file import holds_report
+
+    try:
+        if len(options.runs) != 1 or not holds_report(Path(options.runs[0])):
+            return
+    except InputError:  # what cannot be read is refused where it is read
+        return
+    served = "json" if options.write_expect is None else "force"
+    useless = [
+        action.option_strings[-1]
+        for title, action in command_parser("check").grouped()
+        if title not in _OF_NO_MERGE and action.dest in options.given and action.dest != served
+    ]
+    if useless:
+        run = options.runs[0]
+        raise UsageError(f"{', '.join(useless)}: {run} is a run that was made before: nothing is merged")
+
+
 def _merged(options: argparse.Namespace) -> Report:
     from replay.run_merge import Run
     from replay.sinks import output_paths
 
-    is_written = options.output is not None or options.report is not None
-    if not is_written:
+    written = _written(options)
+    if written is None:
         options.images = "none"
     run_options = inputs.run_options(options)
-    written = outputs.output_options(options, run_options) if is_written else None
     merging = Run(run_options, written, talk.of(options), options.color, is_shown=options.view)
     options.is_published = lambda: written is not None and merging.narrator.is_published
     report = merging.merge()
@@ -154,21 +172,42 @@ def _merged(options: argparse.Namespace) -> Report:
     return report
 
 
+def _written(options: argparse.Namespace) -> OutputOptions | None:
+    """Return what is written of the run; None for nothing."""
+    if options.output is None and options.report is None:
+        return None
+    return outputs.output_options(options, inputs.run_options(options))
+
+
 def _inputs(options: argparse.Namespace) -> list[Path]:
+    """Return what is read, with the images of saved maps."""
     from replay.runs import RunPath
+    from replay.sources import open_source
 
     paths = [RunPath.parse(text).path for text in options.runs]
-    return [*paths, *([options.expect] if options.expect is not None else [])]
+    for path in [each for each in paths if each.suffix in _SAVED_MAPS]:
+        with suppress(ReplayError), open_source(path) as source:  # what cannot be read is refused when it is merged
+            paths += source.files
+    return [*paths, *(path for path in (options.expect, options.config) if path is not None)]
 
 
 def _refuse_files(options: argparse.Namespace) -> None:
-    """Refuse files that could not be written in the end."""
-    from replay.written_files import refuse_files
+    """Refuse files that could not be written in the end, or would replace what is read or what else is written."""
+    from replay.outputs import refuse_alike, refuse_inputs
+    from replay.sinks import reserved_paths
+    from replay.written_files import refuse_files, reserved_names
 
     if options.summary == "":
         raise UsageError('--summary: the name is empty; is the variable set, as "$GITHUB_STEP_SUMMARY" is in a job?')
-    paths = [path for path in (options.junit, Path(options.summary) if options.summary else None) if path is not None]
-    refuse_files(paths, _inputs(options), force=True)
+    summary = Path(options.summary) if options.summary else None
+    paths = [path for path in (options.write_expect, options.junit) if path is not None]
+    appended = [summary] if summary is not None else []
+    refuse_files([*paths, *appended], _inputs(options), force=options.force or options.write_expect is None)
+    written = _written(options)
+    if written is not None:
+        if options.expect is not None:
+            refuse_inputs(reserved_paths(written), [options.expect])
+        refuse_alike([reserved_paths(written), *map(reserved_names, paths), appended])
 
 
 def _write_findings(found: Sequence[Finding], options: argparse.Namespace) -> None:

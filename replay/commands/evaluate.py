@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from replay.errors import UsageError
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE
 from replay.flags.numbers import at_least_0
+from replay.plain_text import plain
 from replay.standard_streams import printing, say
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
             sys.stdout.write(json_text(errors, of_map))
         else:
             for line in lines(errors, of_map):
-                print(line)
+                print(plain(line))
     if all(limit is None for limit in limits):
         return EXIT_DONE
     most_m, most_deg = (math.inf if limit is None else limit for limit in limits)

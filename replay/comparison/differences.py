@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -189,8 +190,10 @@ def pose_words(pose: Sim2) -> str:
 def _notes(before: RunResult, after: RunResult, frame: Sim2 | None) -> Iterator[str]:
     if before.version != after.version:
         yield f"made by replay {before.version} and by replay {after.version}"
-    if before.digests != after.digests:
-        names = sorted(name for name in {*before.digests, *after.digests} if _differs(before, after, name))
+    one_digests, other_digests = (sorted((item.name, item.sha256) for item in run.inputs) for run in (before, after))
+    if one_digests != other_digests:
+        one_left, other_left = Counter(one_digests), Counter(other_digests)
+        names = sorted({name for name, _ in (*(one_left - other_left), *(other_left - one_left))})
         yield f"the inputs are not the same: {', '.join(names)}"
     one, other = ({**run.settings, _WRITTEN: None} for run in (before, after))
     changed = sorted(_changed(one, other))
@@ -201,10 +204,6 @@ def _notes(before: RunResult, after: RunResult, frame: Sim2 | None) -> Iterator[
             f"poses cannot be compared: the first run's are in the frame of {before.reference}, which the second one "
             "did not place"
         )
-
-
-def _differs(before: RunResult, after: RunResult, name: str) -> bool:
-    return before.digests.get(name) != after.digests.get(name)
 
 
 def _changed(one: object, other: object, name: str = "") -> Iterator[str]:

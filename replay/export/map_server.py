@@ -19,6 +19,7 @@ import numpy as np
 from mapmerge.grid import MAX_PERCENT, Cells, Grid
 from replay.errors import OutputError
 from replay.export.image import png
+from replay.figures import exact
 from replay.sources.map_server.map_image import Pixels
 
 OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.196
@@ -80,7 +81,7 @@ def _description(grid: Grid, image: str, mode: str) -> bytes:
         return (
             f"image: {image if _PLAIN_NAME.fullmatch(image) else json.dumps(image, ensure_ascii=False)}\n"
             f"mode: {mode}\n"
-            f"resolution: {grid.resolution_m}\n"
+            f"resolution: {exact(grid.resolution_m)}\n"
             f"origin: [{_number(pose.x_m)}, {_number(pose.y_m)}, {_number(pose.yaw_rad)}]\n"
             "negate: 0\n"
             f"occupied_thresh: {occupied}\n"
@@ -92,6 +93,6 @@ def _description(grid: Grid, image: str, mode: str) -> bytes:
         ) from error
 
 
-def _number(value: float) -> float:
+def _number(value: float) -> str:
     """Return a number without the noise behind its digits, and without a negative zero."""
-    return round(value, _DIGITS) + 0.0
+    return exact(round(value, _DIGITS) + 0.0)

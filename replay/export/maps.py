@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mapmerge.grid import Grid
 from replay.errors import InputError, UsageError
@@ -21,6 +23,9 @@ from replay.topics import MAP_TOPIC
 
 Say = Callable[[Skipped | Noted], None]
 """Is told what of a recording is not used, and what else is to be known of it."""
+
+Check = Callable[[Sequence[Mapping[str, Any]]], None]
+"""Is told what reports say of the inputs; raises if these are not what they should be."""
 
 THE_MAP = "map"
 """What stands for the robot where a map is no robot's."""
@@ -65,8 +70,14 @@ def one_map(path: Path, topic: str | None, at: TimeBound | None, say: Say) -> Ma
     return maps_at(options, at, say)
 
 
-def maps_at(options: RunOptions, at: TimeBound | None, say: Say) -> Maps:
+def maps_at(options: RunOptions, at: TimeBound | None, say: Say, check: Check | None = None) -> Maps:
     """Return all robots' maps as they were at a time; the last ones if none is named.
+
+    Parameters
+    ----------
+    check
+        Is told what reports say of the inputs, before they are read and again when all was; None for nothing, and then
+        no more is read than is needed.
 
     Raises
     ------
@@ -76,7 +87,11 @@ def maps_at(options: RunOptions, at: TimeBound | None, say: Say) -> Maps:
     grids: dict[str, Grid] = {}
     first_ns = stamp_ns = None
     with open_plan(options) as plan:
-        for item in ticks(plan.feeds, tuple(Tally() for _ in plan.feeds), plan.window, strict=False):
+        tallies = tuple(Tally() for _ in plan.feeds)
+        if check is not None:
+            check(plan.describe_inputs())
+        items = ticks(plan.feeds, tallies, plan.window, strict=False)
+        for item in items:
             if isinstance(item, Skipped | Noted):
                 say(item)
             elif isinstance(item, Tick):
@@ -85,6 +100,9 @@ def maps_at(options: RunOptions, at: TimeBound | None, say: Say) -> Maps:
                     break
                 grids.update(item.grids)
                 stamp_ns = item.stamp_ns
+        if check is not None:
+            deque(items, maxlen=0)  # a digest is one of all that was used
+            check(plan.describe_inputs(tallies))
         files = tuple(plan.files())
     if stamp_ns is None:
         paths = ", ".join(str(run.path) for run in options.runs)

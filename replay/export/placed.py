@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -16,11 +18,13 @@ from mapmerge.sim2 import Sim2
 from mapmerge.warp import Layer
 from replay.documents import Node
 from replay.errors import InputError, UsageError
+from replay.events import Noted
 from replay.export.maps import THE_MAP, Maps, Say, grid_topics, maps_at, one_map
-from replay.options import ClockChoice, RunOptions, TimeBound
+from replay.export.same_inputs import refuse_left_out, refuse_others
+from replay.options import DEFAULT_REORDER_WINDOW_NS, ClockChoice, RunOptions, TimeBound
 from replay.plain_text import listed
-from replay.report_file import holds_mcap
-from replay.run_result import RunResult
+from replay.report_file import holds_mcap, read_report
+from replay.run_result import RunInput, RunResult
 from replay.runs import RunPath, TopicChoice
 from replay.sinks.mcap_file import topic_parts
 
@@ -105,7 +109,11 @@ def _own_maps(
     result: RunResult, robots: Sequence[str], recordings: Sequence[RunPath], at: TimeBound | None, say: Say
 ) -> Maps:
     if recordings:
-        return maps_at(_as_merged(result, recordings), at or _end(result), say)
+        merged = _merged_inputs(result, at)
+        options = _as_merged(result, recordings, merged)
+        if not all(item.sha256 for item in merged):
+            say(Noted("", f"{result.name} holds no digests of what was merged; recordings are told by name and size"))
+        return maps_at(options, at or _end(result), say, partial(refuse_others, merged))
     copies = {name: f"/{part}/map" for name, part in topic_parts(list(result.robots)).items()}
     there = grid_topics(result.name) if holds_mcap(result.name) else []
     missing = [name for name in robots if copies[name] not in there]
@@ -119,26 +127,44 @@ def _own_maps(
     return maps_at(RunOptions((RunPath(None, result.name),), tuple(found), choices), at, say)
 
 
-def _as_merged(result: RunResult, recordings: Sequence[RunPath]) -> RunOptions:
+def _merged_inputs(result: RunResult, at: TimeBound | None) -> tuple[RunInput, ...]:
+    """Return what was merged; only the last report of a run knows the digests."""
+    return result.inputs if at is None else RunResult.of(read_report(result.name), result.name).inputs
+
+
+def _as_merged(result: RunResult, recordings: Sequence[RunPath], merged: Sequence[RunInput]) -> RunOptions:
     """Return how the recordings were read, so that maps and times are those of the run.
 
     Raises
     ------
     UsageError
-        If they are not those that were merged.
+        If some of those that were merged are missing.
     """
-    names = [run.path.resolve().name for run in recordings]
-    missing = [name for name in result.digests if name not in names]
-    if missing:
-        raise UsageError(f"--maps {' '.join(names)}: {listed(missing)} was merged as well; give it with --maps, too")
+    given = Counter(run.path.name for run in recordings)
+    left = list(merged)
+    for item in merged:
+        if given[item.name]:
+            given[item.name] -= 1
+            left.remove(item)
+    refuse_left_out(left)
+    settings = Node(result.name, result.settings, ("settings",))
     clock: ClockChoice = "log" if result.settings.get("clock") == "log" else "header"
+    window_ns = settings.maybe("reorder_window_ns", Node.whole)
     return RunOptions(
         tuple(recordings),
         tuple(result.robots),
         _topics(result),
         clock=clock,
+        start=settings.maybe("start", _bound),
+        stop=settings.maybe("stop", _bound),
+        reorder_window_ns=DEFAULT_REORDER_WINDOW_NS if window_ns is None else window_ns,
         align_starts=bool(result.settings.get("align_starts")),
+        max_memory_bytes=settings.maybe("max_memory_bytes", Node.whole),
     )
+
+
+def _bound(node: Node) -> TimeBound:
+    return TimeBound(node.need("ns").whole(), relative=node.need("relative").value is True)
 
 
 def _topics(result: RunResult) -> tuple[TopicChoice, ...]:

@@ -19,7 +19,7 @@ def lines(result: RunResult, robots: Sequence[str], ros: int) -> Iterator[str]:
     ros
         1 or 2: of which ROS the command is.
     """
-    yield f"# {result.name.name}: '{MERGED_FRAME}' is the map frame of {plain(result.reference)}, the reference"
+    yield _comment(f"{result.name.name}: '{MERGED_FRAME}' is the map frame of {result.reference}, the reference")
     for name in robots:
         yield from _robot(result.robots[name], ros)
 
@@ -27,14 +27,19 @@ def lines(result: RunResult, robots: Sequence[str], ros: int) -> Iterator[str]:
 def _robot(robot: RobotResult, ros: int) -> Iterator[str]:
     pose = robot.merged_from_map
     if pose is None:
-        yield f"# {plain(robot.robot)} is not placed: {robot.reason}: {plain(robot.message)}"
+        yield _comment(f"{robot.robot} is not placed: {robot.reason}: {robot.message}")
     elif pose.scale != 1.0:
-        yield (
-            f"# {plain(robot.robot)} is placed with a scale of {pose.scale:.6f}, which no transform can say: its map's "
+        yield _comment(
+            f"{robot.robot} is placed with a scale of {pose.scale:.6f}, which no transform can say: its map's "
             f"resolution is off by that factor; else {_place(pose)}"
         )
     else:
         yield _command(pose, robot.map_frame, ros)
+
+
+def _comment(text: str) -> str:
+    """Return a comment that stays one, whatever names are in it."""
+    return f"# {plain(text)}"
 
 
 def _place(pose: Sim2) -> str:

@@ -89,6 +89,9 @@ def provenance(story: Story) -> Provenance:
 
 def command(story: Story) -> tuple[str | None, str]:
     """Return the command that gives this outcome in the folder of its inputs or, if there is none, why."""
+    names = [str(item["name"]) for item in story.report["inputs"]]
+    if len(set(names)) < len(names):
+        return None, "Several recordings have the same name, and lay in different folders."
     found = shlex.join(["replay", "merge", *_runs(story), *_flags(story)])
     if not found.isprintable():
         return None, "A name in it holds characters that cannot be typed."
@@ -104,7 +107,8 @@ def _runs(story: Story) -> Iterator[str]:
             of.setdefault(index, []).append(robot.robot)
     is_each_of_one = len(names) > 1 and all(len(of.get(index, ())) == 1 for index in range(len(names)))
     for index, name in enumerate(names):
-        yield f"{of[index][0]}={name}" if is_each_of_one else name
+        path = f"./{name}" if name.startswith("-") else name  # which would be taken for a flag
+        yield f"{of[index][0]}={name}" if is_each_of_one else path
 
 
 def _flags(story: Story) -> Iterator[str]:

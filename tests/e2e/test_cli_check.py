@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from junitparser import JUnitXml
 
+from replay.arguments import command_parser
 from tests.bags import write_mcap
 from tests.program import Program, Ran, in_process_of_its_own
 from tests.runs import bare_room, in_log_order, reference_from, seen, two_robots
@@ -134,8 +135,27 @@ def test_a_run_that_was_made_before_is_not_made_again(replay: Program, outcome: 
     for run in (outcome, outcome.with_suffix(".json")):
         ran = checked(replay, run, "robots: {r2: merged}")
         assert (ran.status, ran.err) == (0, "")
-    for flags in (("-o", "new.mcap"), ("--robots", "r1,r2"), ("--init-pose", "r2=0,0,0")):
-        assert "nothing is merged" in checked(replay, outcome, "robots: {r2: merged}", *flags).error
+    (replay.folder / "settings.toml").write_text("", encoding="utf-8")
+    given = [flag for flag in _flags_of_a_merge() if flag.split()[0] not in ("--json", "--config")]
+    assert {"--min-confidence", "--method", "--max-memory", "--clock", "--output"} <= {
+        flag.split()[0] for flag in given
+    }
+    for flag in (*given, "--config settings.toml"):
+        ran = checked(replay, outcome, "robots: {r2: merged}", *flag.split())
+        assert ran.error.startswith(f"{flag.split()[0]}: "), flag
+        assert "nothing is merged" in ran.error
+
+
+def _flags_of_a_merge() -> list[str]:
+    """Return all flags of how to merge and what to write, each with a value that it takes."""
+    values = {"--clock": "log", "--set": "merge.scale=any"}
+    others = ("options", "what is expected", "what is said")
+    return [
+        action.option_strings[-1]
+        + ("" if action.nargs == 0 else f" {values.get(action.option_strings[-1], (action.choices or '1')[0])}")
+        for title, action in command_parser("check").grouped()
+        if action.option_strings and title not in others
+    ]
 
 
 def test_outputs_are_written_where_they_are_asked_for(replay: Program, two: Path) -> None:
@@ -336,3 +356,64 @@ def test_help_has_the_words_of_an_expectation() -> None:
     ran = in_process_of_its_own("check", "--help")
     assert "--write-expect" in ran.stdout
     assert "exit status: 0" in ran.stdout
+
+
+@pytest.mark.parametrize(
+    "flags",
+    [
+        ("-o", "out.mcap", "--junit", "out.json"),
+        ("-o", "out.mcap", "--junit", "./out.rrd"),
+        ("-o", "out.mcap", "--junit", "out.mcap.partial"),
+        ("--report", "out.html", "--summary", "out.html"),
+        ("--junit", "same", "--summary", "same"),
+        ("--junit", "same", "--summary", "same.partial"),
+        ("-o", "out.mcap", "--junit", "linked.json"),
+    ],
+)
+def test_outputs_that_would_replace_each_other_are_refused(replay: Program, two: Path, flags: tuple[str, ...]) -> None:
+    (replay.folder / "out.json").write_text("before", encoding="utf-8")
+    (replay.folder / "linked.json").hardlink_to(replay.folder / "out.json")
+    ran = checked(replay, two, "robots: {r1: reference}", *flags, "--force")
+    assert ran.status == 2
+    assert "is taken by another output" in ran.error
+    assert sorted(path.name for path in replay.folder.iterdir()) == ["expect.yaml", "linked.json", "out.json"]
+    assert (replay.folder / "out.json").read_text(encoding="utf-8") == "before"
+
+
+def test_an_expectation_is_not_written_over_the_run_nor_the_run_over_it(replay: Program, two: Path) -> None:
+    ran = replay("check", two, "-o", "out.mcap", "--write-expect", "out.json")
+    assert (ran.status, "is taken by another output" in ran.error) == (2, True)
+    (replay.folder / "out.json").write_text("robots: {r1: reference}", encoding="utf-8")
+    ran = replay("check", two, "-o", "out.mcap", "--expect", "out.json", "--force")
+    assert (ran.status, "is an input" in ran.error) == (2, True)
+    assert [path.name for path in replay.folder.iterdir()] == ["out.json"]
+
+
+def test_the_image_of_a_saved_map_is_an_input(replay: Program, outcome: Path) -> None:
+    assert replay("export", outcome, "-o", "old").status == 0
+    before = (replay.folder / "old.pgm").read_bytes()
+    ran = checked(replay, replay.folder / "old.yaml", "robots: {old: reference}", "--junit", "old.pgm")
+    assert (ran.status, "is an input" in ran.error) == (2, True)
+    assert (replay.folder / "old.pgm").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{{image: old.pgm, resolution: 0.1, origin: [0, 0, 0], {rest}}}",
+        '{{"image": "old.pgm", "resolution": 0.1, "origin": [0, 0, 0], {rest}}}',
+    ],
+)
+def test_a_saved_map_in_braces_is_no_report(replay: Program, outcome: Path, text: str) -> None:
+    assert replay("export", outcome, "-o", "old").status == 0
+    rest = '"negate": 0, "occupied_thresh": 0.65, "free_thresh": 0.196'
+    (replay.folder / "old.yaml").write_text(text.format(rest=rest), encoding="utf-8")
+    ran = checked(replay, replay.folder / "old.yaml", "robots: {old: reference}")
+    assert ran.status == 0, ran.err
+
+
+def test_of_a_recording_that_cannot_be_read_no_flag_is_blamed(replay: Program, tmp_path: Path) -> None:
+    (tmp_path / "bad.mcap").write_bytes(b"\x89MCAP0\r\n" + b"\xff" * 99)
+    ran = checked(replay, tmp_path / "bad.mcap", "robots: {r1: reference}", "--method", "paper")
+    assert ran.status == 2
+    assert ran.error.startswith(f"{tmp_path / 'bad.mcap'}: ")

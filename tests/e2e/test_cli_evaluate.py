@@ -189,3 +189,13 @@ def test_real_recordings_are_right(replay: Program, name: str) -> None:
         "evaluate", replay.merge(path).mcap, "--truth", truth, "--max-error-m", "0.1", "--max-error-deg", "0.5"
     )
     assert ran.status == 0, ran.out
+
+
+def test_names_do_not_steer_a_terminal(replay: Program, outcome: Path) -> None:
+    report = json.loads(outcome.with_suffix(".json").read_text(encoding="utf-8"))
+    report["robots"]["\x1b[2Jr3"] = report["robots"]["r2"]
+    (replay.folder / "odd.json").write_text(json.dumps(report), encoding="utf-8")
+    ran = evaluated(replay, replay.folder / "odd.json", of_r2())
+    assert ran.status == 0
+    assert ran.out.replace("\n", "").isprintable()
+    assert r"\x1b[2Jr3" in ran.out

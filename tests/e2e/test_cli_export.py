@@ -22,8 +22,19 @@ from replay.sources import open_source
 from tests.bags import write_mcap, write_saved_map
 from tests.data_paths import ROOT
 from tests.outputs import maps
-from tests.program import Program
-from tests.runs import RESOLUTION_M, at, bare_room, flat_map, in_log_order, reference_from, seen, two_robots, updated
+from tests.program import Program, Ran
+from tests.runs import (
+    RESOLUTION_M,
+    at,
+    bare_room,
+    flat_map,
+    growing,
+    in_log_order,
+    reference_from,
+    seen,
+    two_robots,
+    updated,
+)
 
 MAP_SAVER = {"free": 254, "occupied": 0, "unknown": 205}
 
@@ -304,3 +315,96 @@ def test_what_is_no_recording_is_refused(replay: Program, content: bytes) -> Non
     (replay.folder / "bad.mcap").write_bytes(content)
     assert replay("export", "bad.mcap").error.startswith("bad.mcap: ")
     assert replay("export", "bad.mcap", "--to", "tf").error.startswith("bad.mcap: ")
+
+
+def test_maps_are_taken_of_what_was_merged_alone(replay: Program, tmp_path: Path) -> None:
+    for folder, robot in (("a", "r1"), ("b", "r2"), ("c", "r2")):
+        (tmp_path / folder).mkdir()
+        last = flat_map(robot) if folder != "c" else bare_room()
+        write_mcap(
+            tmp_path / folder / "run.mcap", [*growing(robot, topic="/map"), seen(robot, 40.0, last, topic="/map")]
+        )
+    one, other, third = (tmp_path / folder / "run.mcap" for folder in "abc")
+    out = replay.merge(f"r1={one}", f"r2={other}").mcap
+
+    def exported(*runs: str, file: Path = out, robots: str = "r2", flags: tuple[str, ...] = ()) -> Ran:
+        maps_of = [flag for run in runs for flag in ("--maps", run)]
+        return replay("export", file, "--robots", robots, *maps_of, "--mode", "raw", "--force", *flags)
+
+    assert "run.mcap was merged as well" in exported(f"r2={other}").error
+    assert "is not the recording that was merged: it has " in exported(f"r1={one}", f"r2={third}").error
+    assert "is not the recording that was merged" in exported(f"r2={one}", f"r1={other}").error
+    assert "r3" in exported(f"r1={one}", f"r3={other}").error
+    for file in (out, out.with_suffix(".json")):
+        ran = exported(f"r2={other}", f"r1={one}", file=file)
+        assert (ran.status, ran.out) == (0, ""), ran.err
+        assert "digests" not in ran.err
+    assert exported(f"r1={one}", f"r2={other}", flags=("--at", "12")).status == 0
+
+
+@pytest.mark.parametrize("flags", [(), ("--at", "12")])
+def test_a_recording_of_the_same_size_with_other_maps_is_refused(
+    replay: Program, two: Path, tmp_path: Path, flags: tuple[str, ...]
+) -> None:
+    (tmp_path / "other").mkdir()
+    content = bytearray(write_mcap(tmp_path / "other" / two.name, two_robots(), compression="none").read_bytes())
+    plain = write_mcap(tmp_path / two.name, two_robots(), compression="none")
+    out = replay.merge(plain).mcap
+    cells = flat_map("r2", 9.0).cells.tobytes()
+    at_byte = content.index(cells) + cells.index(b"\x64")
+    content[at_byte] = 0x32
+    other = tmp_path / "other" / two.name
+    other.write_bytes(content)
+    ran = replay("export", out, "--robots", "r2", "--maps", other, *flags)
+    assert ran.status == 2
+    assert "its maps have another digest" in ran.err
+    assert replay("export", out, "--robots", "r2", "--maps", plain, *flags).status == 0
+
+
+@pytest.mark.parametrize("flags", [("--start", "5"), ("--stop", "11"), ("--start", "5", "--stop", "15")])
+def test_maps_of_a_part_of_a_recording_are_those_of_that_part(
+    replay: Program, two: Path, flags: tuple[str, ...]
+) -> None:
+    out = replay.merge(two, *flags).mcap
+    assert replay("export", out, "--robots", "r1", "--maps", two, "--mode", "raw", "-o", "r1").status == 0
+    assert (loaded(replay.folder / "r1.yaml").cells >= 0).any()
+
+
+def test_comments_stay_comments_whatever_names_are_in_them(replay: Program, outcome: Path) -> None:
+    report = json.loads(outcome.with_suffix(".json").read_text(encoding="utf-8"))
+    evil = "r2\ntouch pwned\r\x1b[2J"
+    found = report["robots"].pop("r2")
+    report["robots"][evil] = {**found, "status": "unmerged", "merged_from_map": None}
+    report["robots"][evil]["reason"] = {"code": "ambiguous", "message": evil}
+    report["reference"] = evil
+    path = replay.folder / "a\ntouch pwned.json"
+    path.write_text(json.dumps(report), encoding="utf-8")
+    ran = replay("export", path, "--to", "tf")
+    assert (ran.status, ran.err) == (0, "")
+    lines = ran.out.split("\n")
+    assert [line[:2] for line in lines] == ["# ", "ro", "# ", ""]
+    assert "".join(lines).isprintable()
+
+
+def test_a_reason_that_there_is_not_is_refused(replay: Program, outcome: Path) -> None:
+    report = json.loads(outcome.with_suffix(".json").read_text(encoding="utf-8"))
+    report["robots"]["r2"]["reason"]["code"] = "x\ntouch pwned"
+    (replay.folder / "bad.json").write_text(json.dumps(report), encoding="utf-8")
+    error = replay("export", "bad.json", "--to", "tf").error
+    assert "robots.r2.reason.code is 'x\\ntouch pwned'; expected one of reference, accepted" in error
+
+
+@pytest.mark.parametrize(
+    ("target", "name"),
+    [
+        *((target, name) for target in ("map_server", "tf") for name in ("", ".", "..", "/", "there", "there/..")),
+        ("map_server", ".yaml"),
+        ("png", "there/.png"),
+    ],
+)
+def test_a_name_that_no_file_can_have_is_refused(replay: Program, outcome: Path, target: str, name: str) -> None:
+    (replay.folder / "there").mkdir()
+    ran = replay("export", outcome, "--to", target, "-o", name)
+    assert ran.status == 2
+    assert "expected a name of files, such as " in ran.error
+    assert [path.name for path in replay.folder.rglob("*")] == ["there"]

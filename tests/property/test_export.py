@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import tempfile
+import warnings
 from pathlib import Path
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from ruamel.yaml import YAML
 
 from mapmerge.grid import Grid
 from mapmerge.sim2 import IDENTITY, Sim2
@@ -54,6 +56,25 @@ def test_a_map_that_lies_by_whole_cells_is_copied(own: np.ndarray, merged: np.nd
     assert whole.cols >= merged.shape[1]
 
 
+@given(
+    st.floats(1e-6, 100.0),
+    st.builds(Sim2, st.floats(-1e8, 1e8), st.floats(-1e-3, 1e-3), st.floats(-1e-3, 1e-3)),
+    st.sampled_from(["trinary", "scale", "raw"]),
+)
+def test_numbers_are_numbers_for_all_readers_of_yaml(resolution_m: float, pose: Sim2, mode: str) -> None:
+    """YAML 1.1, which most loaders of maps read, takes 1e-05 for a text."""
+    grid = Grid(np.zeros((1, 1), np.int8), resolution_m, pose)
+    (text,) = [content for path, content in files(grid, Path("map"), mode).items() if path.suffix == ".yaml"]
+    reader = YAML(typ="safe", pure=True)
+    reader.version = (1, 1)
+    with warnings.catch_warnings(action="error"):  # which is what this reader says of such a text, and takes it
+        found = reader.load(text.decode())
+    assert found["resolution"] == resolution_m
+    assert all(isinstance(each, float) for each in (*found["origin"], found["resolution"]))
+    assert np.abs(np.subtract(found["origin"], (pose.x_m, pose.y_m, pose.yaw_rad))).max() <= 1e-9
+    assert all(isinstance(found[key], float) for key in ("occupied_thresh", "free_thresh"))
+
+
 shares = st.none() | st.floats(0.0, 1.0)
 
 
@@ -75,7 +96,7 @@ def results(draw: st.DrawFn) -> RunResult:
     }
     robots = {"r1": robot("r1", "reference", IDENTITY, draw(shares), None), **robots}
     skipped = draw(st.dictionaries(st.sampled_from(["damaged", "empty"]), st.integers(1, 9)))
-    return RunResult(Path("run.json"), "r1", robots, skipped, "1", {}, {})
+    return RunResult(Path("run.json"), "r1", robots, skipped, "1", {}, ())
 
 
 @given(results())
