@@ -14,6 +14,11 @@ def rounded_down(value: float, digits: int) -> float:
     return math.floor(round(value * 10.0**digits, 9)) / 10.0**digits
 
 
+def fixed(value: float, digits: int) -> str:
+    """Return a number with so many digits after the point; no zero has a sign."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
 def percent_below(share: float, limit: float) -> tuple[str, str]:
     """Return a share and the limit that it is below as percents, with as many digits as show which is less."""
     for digits in range(2 if share > _NEAR_ONE or share < _NEAR_ZERO else 0, _MOST_DIGITS):

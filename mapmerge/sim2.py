@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mapmerge.rounding import fixed
+
 Points = NDArray[np.float64]
 
 
@@ -48,8 +50,16 @@ class Sim2:
 
     def __str__(self) -> str:
         """Return it to read: ``x 4.50 m, y -1.20 m, yaw 90.0°``, and its scale if that is not 1."""
-        scale = f", scale {self.scale:.3f}" if self.scale != 1.0 else ""
-        return f"x {self.x_m:.2f} m, y {self.y_m:.2f} m, yaw {math.degrees(self.yaw_rad):.1f}°{scale}"
+        scale = "" if math.isclose(self.scale, 1.0) else f", scale {fixed(self.scale, 3)}"
+        return f"{self.in_words()}{scale}"
+
+    def in_words(self, digits: int = 2) -> str:
+        """Return where it lies and how it is turned; metres with so many digits after the point, degrees with one less.
+
+        All texts that people read have it from here, so that one place is not said in two ways.
+        """
+        x, y = fixed(self.x_m, digits), fixed(self.y_m, digits)
+        return f"x {x} m, y {y} m, yaw {fixed(math.degrees(self.yaw_rad), digits - 1)}°"
 
     def __matmul__(self, other: Sim2) -> Sim2:
         """Return the transform that applies ``other`` first, then this one."""

@@ -6,26 +6,14 @@ import os
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
-from decimal import Decimal
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mapmerge.config import MergeConfig, ScaleChoice
-from mapmerge.errors import ConfigError
+from replay import keywords
 from replay.errors import UsageError
 from replay.events import Event, Finished, Report
-from replay.footprint import size_to_bytes
 from replay.init_pose import InitPose
-from replay.options import (
-    ClockChoice,
-    ImageChoice,
-    OutputOptions,
-    RunOptions,
-    TimeBound,
-    TrajectoryChoice,
-    seconds_to_ns,
-)
-from replay.runs import RunPath, TopicChoice
+from replay.options import ClockChoice, ImageChoice, OutputOptions, RunOptions, TrajectoryChoice
 
 if TYPE_CHECKING:
     from typing import Self
@@ -115,28 +103,30 @@ def merge(
     >>> report["robots"]["r2"]["status"]
     'merged'
     """
-    paths = _run_paths(runs)
+    paths = keywords.run_paths(runs)
     if not paths:
         raise UsageError("no recording was given; expected a path, several, or one for each robot")
+    drawn = None if images is None else keywords.one_of("images", images, ("none", "changed", "all"))
+    driven = None if trajectories is None else keywords.one_of("trajectories", trajectories, ("none", "auto", "all"))
     options = RunOptions(
         runs=paths,
-        robots=None if robots is None else _names(robots),
-        topics=_topics(topics),
-        clock=_one_of("clock", clock, ("header", "log")),
-        start=_bound(start),
-        stop=_bound(stop),
-        reorder_window_ns=_nanoseconds(reorder_window_s),
-        align_starts=align_starts,
-        strict=strict,
-        images=_one_of("images", images or "none", ("none", "changed", "all")),
-        init_poses=_init_poses(init_poses),
-        use_tf=use_tf,
-        merge=_merge_config(config or MergeConfig(), method, scale, min_confidence),
-        max_memory_bytes=size_to_bytes(max_memory) if isinstance(max_memory, str) else max_memory,
-        trajectories=_one_of("trajectories", trajectories or "none", ("none", "auto", "all")),
-        jobs=jobs,
+        robots=keywords.robot_names(robots),
+        topics=keywords.topic_choices(topics),
+        clock=keywords.one_of("clock", clock, ("header", "log")),
+        start=keywords.time_bound("start", start),
+        stop=keywords.time_bound("stop", stop),
+        reorder_window_ns=keywords.nanoseconds("reorder_window_s", reorder_window_s),
+        align_starts=keywords.truth("align_starts", align_starts),
+        strict=keywords.truth("strict", strict),
+        images=drawn or "none",
+        init_poses=keywords.init_poses(init_poses),
+        use_tf=keywords.truth("use_tf", use_tf),
+        merge=keywords.merge_config(config, method, scale, min_confidence),
+        max_memory_bytes=keywords.max_memory_bytes(max_memory),
+        trajectories=driven or "none",
+        jobs=keywords.job_count(jobs),
     )
-    return MergeRun(options, written_images=images or "changed", written_trajectories=trajectories or "auto")
+    return MergeRun(options, written_images=drawn or "changed", written_trajectories=driven or "auto")
 
 
 class MergeRun(Iterator[Event]):
@@ -222,28 +212,22 @@ class MergeRun(Iterator[Event]):
         """
         if self._events is not None:
             raise UsageError("events of this run were taken already; call replay.merge anew and write that")
+        from replay.execute import merge_into
         from replay.flags.values import html_path, mcap_path
-        from replay.outputs import refuse_outputs
-        from replay.pipeline import drain, events
-        from replay.plan import open_plan
         from replay.sinks import open_sinks
 
         written = OutputOptions(
-            mcap_path(Path(output)),
-            rrd=rrd,
-            html=None if report is None else html_path(Path(report)),
-            every_ns=_nanoseconds(every_s),
-            copy_maps=copy_maps,
-            force=force,
+            mcap_path(keywords.path("output", output)),
+            rrd=keywords.truth("rrd", rrd),
+            html=None if report is None else html_path(keywords.path("report", report)),
+            every_ns=keywords.nanoseconds("every_s", every_s),
+            copy_maps=keywords.truth("copy_maps", copy_maps),
+            force=keywords.truth("force", force),
         )
         trajectories: TrajectoryChoice = self._written_trajectories if rrd else "none"
         options = replace(self.options, images=self._written_images, trajectories=trajectories)
         self._events = _nothing()
-        refuse_outputs(written, [item.path for item in options.runs])
-        with open_plan(options) as plan:
-            refuse_outputs(written, plan.files())
-            with open_sinks(written) as sinks:
-                return drain(events(plan, options, written), sinks, options.jobs).report
+        return merge_into(lambda: open_sinks(written), options, written)
 
     def close(self) -> None:
         """End it, and close the recordings; harmless at any time."""
@@ -259,73 +243,3 @@ class MergeRun(Iterator[Event]):
 
 def _nothing() -> Generator[Event, None, None]:
     yield from ()
-
-
-def _run_paths(runs: PathLike | Sequence[PathLike] | Mapping[str, PathLike]) -> tuple[RunPath, ...]:
-    if isinstance(runs, Mapping):
-        return tuple(RunPath(robot, Path(path)) for robot, path in runs.items())
-    several = [runs] if isinstance(runs, (str, os.PathLike)) else runs
-    # a path is one, whatever equals signs are in it
-    return tuple(RunPath(None, Path(path)) for path in several)
-
-
-def _names(robots: Sequence[str]) -> tuple[str, ...]:
-    if isinstance(robots, str) or not robots or len(set(robots)) != len(robots):
-        raise UsageError(f"robots is {robots!r}; expected a list of names, each once, the reference first")
-    return tuple(robots)
-
-
-def _topics(topics: str | Sequence[str] | Mapping[str, str]) -> tuple[TopicChoice, ...]:
-    if isinstance(topics, Mapping):
-        return tuple(TopicChoice(robot, topic) for robot, topic in topics.items())
-    return tuple(TopicChoice.parse(text) for text in ([topics] if isinstance(topics, str) else topics))
-
-
-def _bound(time: float | str | datetime | None) -> TimeBound | None:
-    if time is None:
-        return None
-    if isinstance(time, (int, float)):
-        return TimeBound(_nanoseconds(time), relative=True)
-    return TimeBound.parse(time if isinstance(time, str) else time.isoformat())
-
-
-def _nanoseconds(seconds: float) -> int:
-    number = Decimal(str(seconds))
-    return seconds_to_ns(f"{number:f}" if number.is_finite() else str(seconds))
-
-
-def _init_poses(poses: Mapping[str, Sequence[float]] | Iterable[InitPose]) -> tuple[InitPose, ...]:
-    if not isinstance(poses, Mapping):
-        return tuple(poses)
-    for robot, values in poses.items():
-        if len(values) not in (3, 6):
-            raise UsageError(
-                f"init_poses of {robot} has {len(values)} numbers; expected x_m, y_m and yaw_rad, and the standard "
-                "deviation of each, if any"
-            )
-    return tuple(InitPose(robot, *map(float, values)) for robot, values in poses.items())
-
-
-def _merge_config(
-    config: MergeConfig, method: str | None, scale: ScaleChoice | None, min_confidence: float | None
-) -> MergeConfig:
-    """Return the settings of the merger with those in place that have keywords of their own."""
-    from mapmerge.match import MATCHERS
-
-    changes: dict[str, Any] = {}
-    if method is not None:
-        changes["method"] = _one_of("method", method, tuple(MATCHERS))
-    if scale is not None:
-        changes["scale"] = _one_of("scale", scale, ("metadata", "free"))
-    try:
-        if min_confidence is not None:
-            changes["verify"] = replace(config.verify, min_confidence=min_confidence)
-        return replace(config, **changes)
-    except ConfigError as error:
-        raise UsageError(str(error)) from error
-
-
-def _one_of(name: str, value: Any, choices: tuple[str, ...]) -> Any:  # noqa: ANN401 - one of the choices
-    if value not in choices:
-        raise UsageError(f"{name} is {value!r}; expected one of {', '.join(choices)}")
-    return value

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 from mapmerge.merger import MergeResult
 from mapmerge.outcome import Change, ChangeKind
 from mapmerge.sim2 import Sim2
+from replay.words import JUMPED
 
 INFO, WARN = "INFO", "WARN"
 Entry = tuple[str, str]
@@ -23,10 +23,9 @@ def decisions(result: MergeResult) -> Iterator[Entry]:
 def _decision(change: Change, pose: Sim2 | None) -> Entry:
     why = f" (searched, as {change.trigger.words})" if change.trigger else ""
     if change.kind is ChangeKind.JUMPED:
-        return WARN, f"the map of {change.robot} jumped in its own frame: {change.reason.message}"
+        return WARN, f"{JUMPED.format(change.robot)}: {change.reason.message}"
     if change.kind is ChangeKind.WITHDRAWN or pose is None:
         return WARN, f"{change.robot} is withdrawn: {change.reason.message}{why}"
-    at = f"x {pose.x_m:.2f} m, y {pose.y_m:.2f} m, yaw {math.degrees(pose.yaw_rad):.1f}°"
     if change.kind is ChangeKind.MOVED:
-        return INFO, f"{change.robot} moved to {at}: {change.reason.message}{why}"
-    return INFO, f"{change.robot} {change.reason.message}; at {at}"
+        return INFO, f"{change.robot} moved to {pose}: {change.reason.message}{why}"
+    return INFO, f"{change.robot} {change.reason.message}; at {pose}"

@@ -99,11 +99,15 @@ class Node:
         """Return the value as text."""
         return self.value if isinstance(self.value, str) else self.refuse("a text")
 
+    def elements(self) -> tuple[Node, ...]:
+        """Return the values of a list."""
+        if not isinstance(self.value, list):
+            self.refuse("a list")
+        return tuple(replace(self, value=each, keys=(*self.keys, at)) for at, each in enumerate(self.value))
+
     def texts(self) -> tuple[str, ...]:
         """Return a text, or a list of texts."""
-        if isinstance(self.value, list):
-            return tuple(replace(self, value=each, keys=(*self.keys, at)).text() for at, each in enumerate(self.value))
-        return (self.text(),)
+        return tuple(each.text() for each in self.elements()) if isinstance(self.value, list) else (self.text(),)
 
     def truth(self) -> bool:
         """Return the value as true or false."""
@@ -128,7 +132,7 @@ class Node:
         """Return the value as a point: two numbers."""
         if not isinstance(self.value, list) or len(self.value) != 2:
             self.refuse("[x, y], two numbers of metres")
-        x_m, y_m = (replace(self, value=each, keys=(*self.keys, at)).number() for at, each in enumerate(self.value))
+        x_m, y_m = (each.number() for each in self.elements())
         return x_m, y_m
 
 

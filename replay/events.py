@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from replay.skip_cause import SkipCause
+from replay.words import moment
 
 if TYPE_CHECKING:
     import numpy as np
@@ -93,7 +94,7 @@ class Skipped:
     @property
     def where(self) -> str:
         """Where it was, in words, without the input."""
-        return self.place or f"{self.topic} at {self.log_time_ns} ns"
+        return self.place or f"{self.topic} at {moment(self.log_time_ns)}"
 
 
 @dataclass(frozen=True, slots=True)

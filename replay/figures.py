@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from decimal import Decimal
 from typing import Any
 
+from mapmerge import rounding
 from mapmerge.rounding import rounded_down
 
 NO_FIGURE = "–"
@@ -36,7 +37,7 @@ def degrees(yaw_rad: float, digits: int = 1) -> str:
 
 def fixed(value: float, digits: int) -> str:
     """Return a number with so many digits behind the point; no zero has a sign."""
-    return f"{round(value, digits) + 0.0:.{digits}f}"
+    return rounding.fixed(value, digits)
 
 
 def init_pose(robot: str, pose: Mapping[str, Any]) -> str:

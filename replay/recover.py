@@ -104,7 +104,7 @@ def recover(damaged: Path, output: Path, *, force: bool = False) -> Recovery:
         copy.finish()
         with held_off():
             refuse_existing(options)
-            publish([copy], [file], list(all_output_paths(options).values()))
+            publish([copy], [file], all_output_paths(options))
     return Recovery(
         damaged, output, salvage.messages, salvage.until_ns, salvage.is_whole, salvage.left_out, tuple(removed)
     )

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from replay.errors import UsageError
 from replay.events import Report
 from replay.options import OutputOptions, RunOptions
 from replay.sinks.base import Sink
 from replay.sinks.terminal import Narrator, ProgressSink, Talk, open_notes
+
+if TYPE_CHECKING:
+    from replay.plan import Plan
 
 
 class Run:
@@ -54,27 +58,16 @@ class Run:
         ReplayError
             If an input cannot be read, or an output not be written.
         """
-        from replay.outputs import refuse_outputs
+        from replay.execute import merge_into
 
-        if self._written is not None:
-            refuse_outputs(self._written, [item.path for item in self._options.runs])
         if self._is_shown:
             from replay import viewer
 
             viewer.refuse_without_screen(viewer.INSTEAD_OF_LIVE)
+        return merge_into(self._sinks, self._options, self._written, self._planned)
 
-        import cv2
-
-        from replay.pipeline import drain, events
-        from replay.plan import open_plan
-
-        cv2.setNumThreads(1)  # the threads are our own, see --jobs
-        with open_plan(self._options) as plan:
-            if self._written is not None:
-                refuse_outputs(self._written, plan.files())
-            self.narrator.unused_topics = plan.unused_topics()
-            with self._sinks() as sinks:
-                return drain(events(plan, self._options, self._written), sinks, self._options.jobs).report
+    def _planned(self, plan: Plan) -> None:
+        self.narrator.unused_topics = plan.unused_topics()
 
     @contextmanager
     def _sinks(self) -> Iterator[Sequence[Sink]]:

@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, timedelta
 
 from replay.plain_text import listed
+
+STATUS_WORDS: Mapping[str, str] = {
+    "reference": "reference",
+    "merged": "merged",
+    "unmerged": "not merged",
+    "no_map": "no map",
+}
+"""What became of a robot's map, by the status in the report."""
+
+JUMPED = "the map of {} jumped in its own frame"
+WITHDRAWN = "{} was withdrawn for some time"
+"""What may have gone wrong with the map of a robot that is merged after all."""
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from mapmerge.rounding import rounded_down
 from mapmerge.sim2 import Sim2, wrap_angle
 from replay.checks.expectation import Expectation, PoseExpectation, RobotExpectation
-from replay.figures import degrees, fixed
 from replay.run_result import RobotResult, RunResult
 
 RUN = "run"
@@ -113,8 +112,7 @@ def _pose(robot: str, expected: PoseExpectation, found: Sim2 | None) -> Finding:
     off_m = math.hypot(x_m - true_x_m, y_m - true_y_m)
     off_deg = abs(math.degrees(wrap_angle(found.yaw_rad - true.yaw_rad)))
     holds = off_m <= expected.within_m and off_deg <= expected.within_deg
-    is_at = f"x {fixed(found.x_m, 3)} m, y {fixed(found.y_m, 3)} m, yaw {degrees(found.yaw_rad, 2)}°"
-    said = f"it lies {off_m:.3f} m and {off_deg:.2f}° off, at {is_at}"
+    said = f"it lies {off_m:.3f} m and {off_deg:.2f}° off, at {found.in_words(3)}"
     if expected.scaled:
         off = abs(found.scale / true.scale - 1.0)
         what += f", with scale {true.scale:g} within {expected.within_scale:g}"

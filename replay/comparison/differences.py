@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 
 from mapmerge.sim2 import Sim2, wrap_angle
 from replay.errors import UsageError
-from replay.figures import degrees, fixed
 from replay.run_result import RobotResult, RunResult
 
 _DIGITS = 6
@@ -150,7 +149,7 @@ def _moved(robot: str, one: Sim2, other: Sim2, tolerance: Tolerance) -> Iterator
     if ratio != 1.0:
         detail += f", scaled by {ratio:.4f}"
     amounts = {"distance_m": distance_m, "dx_m": dx_m, "dy_m": dy_m, "turn_deg": turn_deg, "scale_ratio": ratio}
-    yield Difference(robot, "moved", pose_words(one), pose_words(other), detail, _rounded(amounts))
+    yield Difference(robot, "moved", one.in_words(3), other.in_words(3), detail, _rounded(amounts))
 
 
 def _figures(one: RobotResult, other: RobotResult, tolerance: Tolerance) -> Iterator[Difference]:
@@ -180,11 +179,6 @@ def _figure(
 
 def _rounded(amounts: Mapping[str, float]) -> dict[str, float]:
     return {name: round(value, _DIGITS) + 0.0 for name, value in amounts.items()}
-
-
-def pose_words(pose: Sim2) -> str:
-    """Return a pose in words."""
-    return f"x {fixed(pose.x_m, 3)} m, y {fixed(pose.y_m, 3)} m, yaw {degrees(pose.yaw_rad, 2)}°"
 
 
 def _notes(before: RunResult, after: RunResult, frame: Sim2 | None) -> Iterator[str]:

@@ -6,14 +6,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from mapmerge.outcome import ChangeKind, Status
+from mapmerge.outcome import ChangeKind
 from replay.figures import seconds
 from replay.html.axes import Axis
 from replay.html.plots import Mark, time_axis, time_marks
-from replay.html.robots import STATUS_WORDS
 from replay.html.roster import Member
 from replay.html.story import Decision, Story
 from replay.options import NS_PER_S
+from replay.words import STATUS_WORDS
 
 MOST_MARKS = 60
 MOST_ENTRIES = 400
@@ -107,7 +107,7 @@ def _phases(story: Story, member: Member, over: Axis) -> Iterator[Phase]:
         at, end = (over.share(each_ns / NS_PER_S) * 100.0 for each_ns in (since_ns, until_ns))
         if story.first_ns == story.last_ns:
             end = 100.0
-        words = STATUS_WORDS[Status(statuses[begin])]
+        words = STATUS_WORDS[statuses[begin]]
         said = f"{words} from {seconds(since_ns)} to {seconds(until_ns)}"
         yield Phase(statuses[begin], said, round(at, 2), round(max(0.4, end - at), 2))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,7 +17,7 @@ from mapmerge.sim2 import IDENTITY, Sim2
 from mapmerge.verify import Scores
 from mapmerge.watch import Trigger
 from replay.advice import ADVICE
-from replay.figures import area, degrees, fixed, percent, seconds, share
+from replay.figures import area, percent, seconds, share
 from replay.html.pictures import CONTRADICT, Picture, overlay_picture
 from replay.html.roster import Member
 from replay.html.story import Story
@@ -124,7 +123,7 @@ def _candidates(story: Story, pair: Pair, match: Match, most: int) -> list[Candi
     is_believed = match.reason.code is ReasonCode.PRIOR_CONTRADICTED
     best = Candidate(
         "Best candidate where it was said to be" if is_believed else "Best candidate",
-        _pose(match.target_from_source),
+        str(match.target_from_source),
         match.reason.message,
         _figures(match),
         _overlay(story, pair, match.target_from_source, _RIVAL_SIDE_PX),
@@ -132,7 +131,7 @@ def _candidates(story: Story, pair: Pair, match: Match, most: int) -> list[Candi
     others = [
         Candidate(
             "Where the maps do fit" if is_believed and number == 1 else f"Rival {number}",
-            _pose(rival.target_from_source),
+            str(rival.target_from_source),
             _against(story, rival),
             _rival_figures(rival),
             _overlay(story, pair, rival.target_from_source, _RIVAL_SIDE_PX),
@@ -211,11 +210,6 @@ def _times(likelihood: float) -> str:
 
 def _metres(length_m: float) -> str:
     return f"{rounded_down(length_m, 1):,.1f} m"
-
-
-def _pose(pose: Sim2) -> str:
-    scale = "" if math.isclose(pose.scale, 1.0) else f", scale {fixed(pose.scale, 3)}"
-    return f"x {fixed(pose.x_m, 2)} m, y {fixed(pose.y_m, 2)} m, yaw {degrees(pose.yaw_rad)}°{scale}"
 
 
 def _searched(since_ns: int, trigger: str) -> str:

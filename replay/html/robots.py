@@ -8,13 +8,7 @@ from mapmerge.outcome import Status
 from replay.figures import NO_FIGURE, area, degrees, fixed, init_pose, seconds, share
 from replay.html.roster import Member
 from replay.html.story import Story
-
-STATUS_WORDS = {
-    Status.REFERENCE: "reference",
-    Status.MERGED: "merged",
-    Status.UNMERGED: "not merged",
-    Status.NO_MAP: "no map",
-}
+from replay.words import STATUS_WORDS
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from replay.figures import percent, share
 from replay.html.roster import Member
 from replay.html.story import Story
 from replay.plain_text import brief, listed
-from replay.words import counted
+from replay.words import JUMPED, WITHDRAWN, counted
 
 Level = Literal["good", "partly", "bad"]
 
@@ -153,8 +153,8 @@ def _troubles(story: Story) -> Iterator[tuple[str, str]]:
     report = story.report
     yield from _losses(report)
     for kind, words in (
-        (ChangeKind.JUMPED, "the map of {} jumped in its own frame"),
-        (ChangeKind.WITHDRAWN, "{} was withdrawn for some time"),
+        (ChangeKind.JUMPED, JUMPED),
+        (ChangeKind.WITHDRAWN, WITHDRAWN),
     ):
         robots = dict.fromkeys(item["robot"] for item in report["history"] if item["event"] == kind)
         for robot in robots:

@@ -9,7 +9,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
-from replay.errors import UsageError
+from replay.errors import InputError, UsageError
 from replay.settings.keys import refuse_unknown
 
 RUN_SUFFIXES = (".json", ".mcap")
@@ -63,7 +63,7 @@ def read_assignment(text: str, known: list[str]) -> dict[str, Said]:
     found: Any = value
     try:
         table = tomllib.loads(f"x = {value}", parse_float=Decimal)
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         pass
     else:
         found = table["x"] if len(table) == 1 else value
@@ -74,13 +74,7 @@ def read_assignment(text: str, known: list[str]) -> dict[str, Said]:
 
 def _document(path: Path) -> Mapping[str, Any]:
     if path.suffix in RUN_SUFFIXES:
-        from replay.report_file import read_report
-        from replay.settings.of_run import document_of
-
-        try:
-            return document_of(read_report(path)["settings"])
-        except (KeyError, TypeError) as error:
-            raise UsageError(f"{path}: its settings are not those that a run writes; give it as it was") from error
+        return _of_run(path)
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -90,8 +84,22 @@ def _document(path: Path) -> Mapping[str, Any]:
         return tomllib.loads(data.decode("utf-8-sig"), parse_float=Decimal)
     except UnicodeDecodeError as error:
         raise UsageError(f"{path}: is no text in UTF-8; expected settings in TOML") from error
-    except tomllib.TOMLDecodeError as error:
-        raise UsageError(f"{path}: is no TOML: {error}") from error
+    except (ValueError, RecursionError) as error:  # also a number of very many digits
+        raise UsageError(f"{path}: is no TOML: {' '.join(str(error).split())}") from error
+
+
+def _of_run(path: Path) -> Mapping[str, Any]:
+    from replay.documents import Node
+    from replay.report_file import read_report
+    from replay.settings.of_run import document_of
+
+    report = Node(path, read_report(path))
+    try:
+        return document_of(report.need("settings"))
+    except InputError as error:
+        raise UsageError(f"{error}; these are not settings that a run writes: give the file as it was") from error
+    except RecursionError as error:
+        raise UsageError(f"{path}: its settings are nested too deep for a run's; give the file as it was") from error
 
 
 def _flat(

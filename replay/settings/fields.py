@@ -117,10 +117,17 @@ def _read(hint: Any, value: object) -> Any:  # noqa: ANN401 - any of the fields'
     if get_origin(hint) is Literal:
         return value if value in get_args(hint) else None
     if hint is float and isinstance(value, (int, float, Decimal)) and not isinstance(value, bool):
-        return float(value)
+        return _float(value)
     if hint is int and isinstance(value, bool):
         return None
     return value if hint in (int, bool, str) and isinstance(value, hint) else None
+
+
+def _float(value: float | Decimal) -> float | None:
+    try:
+        return float(value)
+    except OverflowError:
+        return None
 
 
 def _expected(hint: Any, value: object) -> str:  # noqa: ANN401 - any of the fields' types

@@ -3,53 +3,74 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from decimal import Decimal
 from typing import Any
 
+from replay.documents import Node
 from replay.init_pose import InitPose
 from replay.options import NS_PER_S
 
 
-def document_of(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of a report as those of a file; which recordings were read is not among them."""
-    outputs = settings.get("outputs") or {}
+def document_of(settings: Node) -> dict[str, Any]:
+    """Return the settings of a report as those of a file; which recordings were read is not among them.
+
+    Raises
+    ------
+    InputError
+        If what a run writes is missing or of another kind.
+    """
+    outputs = settings.get("outputs")
     document = {
-        "robots": settings.get("robots"),
-        "topics": [_topic(item) for item in settings["topics"]],
+        "robots": settings.maybe("robots", _texts),
+        "topics": [_topic(item) for item in settings.need("topics").elements()],
         "time": {
-            "clock": settings["clock"],
-            "start": _bound(settings["start"]),
-            "stop": _bound(settings["stop"]),
-            "reorder_window_s": _seconds(settings["reorder_window_ns"]),
-            "align_starts": settings["align_starts"],
+            "clock": settings.need("clock").text(),
+            "start": settings.maybe("start", _bound),
+            "stop": settings.maybe("stop", _bound),
+            "reorder_window_s": _seconds(settings.need("reorder_window_ns")),
+            "align_starts": settings.need("align_starts").truth(),
         },
         "placing": {
-            "init_poses": [str(InitPose(**item)) for item in settings["init_poses"]],
-            "use_tf": settings["use_tf"],
+            "init_poses": [str(_init_pose(item)) for item in settings.need("init_poses").elements()],
+            "use_tf": settings.need("use_tf").truth(),
         },
-        "outputs": {
-            "images": outputs.get("images"),
-            "every_s": None if "every_ns" not in outputs else _seconds(outputs["every_ns"]),
-            "copy_maps": outputs.get("copy_maps"),
-        },
-        "rules": {"max_memory": settings["max_memory_bytes"]},
-        "merge": settings["merge"],
+        "outputs": {} if outputs is None else _outputs(outputs),
+        "rules": {"max_memory": settings.maybe("max_memory_bytes", Node.whole)},
+        "merge": {key: item.value for key, item in settings.need("merge").items()},
     }
     return _without_none(document)
 
 
-def _topic(item: Mapping[str, str | None]) -> str:
-    return str(item["topic"]) if item["robot"] is None else f"{item['robot']}={item['topic']}"
+def _outputs(node: Node) -> dict[str, Any]:
+    return {
+        "images": node.maybe("images", Node.text),
+        "every_s": node.maybe("every_ns", _seconds),
+        "copy_maps": node.maybe("copy_maps", Node.truth),
+    }
 
 
-def _bound(item: Mapping[str, Any] | None) -> Decimal | str | None:
-    if item is None:
-        return None
-    return _seconds(item["ns"]) if item["relative"] else f"{item['ns']}ns"
+def _texts(node: Node) -> list[str]:
+    return list(node.texts())
 
 
-def _seconds(time_ns: int) -> Decimal:
-    return Decimal(time_ns) / NS_PER_S
+def _topic(node: Node) -> str:
+    robot, topic = node.maybe("robot", Node.text), node.need("topic").text()
+    return topic if robot is None else f"{robot}={topic}"
+
+
+def _init_pose(node: Node) -> InitPose:
+    robot, *numbers = (item.name for item in fields(InitPose))
+    return InitPose(node.need(robot).text(), *(node.need(name).number() for name in numbers))
+
+
+def _bound(node: Node) -> Decimal | str:
+    time = node.need("ns")
+    return _seconds(time) if node.need("relative").truth() else f"{time.whole()}ns"
+
+
+def _seconds(node: Node) -> Decimal:
+    return Decimal(node.whole()) / NS_PER_S
 
 
 def _without_none(document: Mapping[str, Any]) -> dict[str, Any]:

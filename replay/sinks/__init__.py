@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 
 from replay.errors import UsageError
+from replay.html.own_page import is_own_page
 from replay.interrupts import held_off
 from replay.options import OutputOptions
 from replay.sinks.base import Sink
@@ -44,21 +45,29 @@ def output_paths(options: OutputOptions) -> dict[str, Path]:
     return {name: path for name in SINKS if (path := asked[name]) is not None}
 
 
-def all_output_paths(options: OutputOptions) -> dict[str, Path]:
-    """Return the files that belong together under this name, also those that are not written this time."""
-    return output_paths(replace(options, rrd=True))
+def all_output_paths(options: OutputOptions) -> list[Path]:
+    """Return the files that belong together under this name, also those that are not written this time.
+
+    A page beside the MCAP is one of them if an earlier run wrote it and files may be replaced; it may have been set
+    aside already. Somebody else's page is none of them, and stays.
+    """
+    *others, report = output_paths(replace(options, rrd=True)).values()
+    page = options.mcap.with_suffix(".html")
+    there = page if os.path.lexists(page) else aside_name(page)
+    older = [page] if options.force and page not in others and is_own_page(there) else []
+    return [*others, *older, report]
 
 
 def reserved_paths(options: OutputOptions) -> tuple[Path, ...]:
     """Return all that may be written or removed: final names, temporary ones, and those of what is replaced."""
-    finals = all_output_paths(options).values()
+    finals = all_output_paths(options)
     return *(name(path) for path in finals for name in (Path, partial_name, aside_name)), recovering_name(options.mcap)
 
 
 def refuse_existing(options: OutputOptions) -> None:
     """Refuse to replace what is there, unless that was asked for."""
     # a link that leads nowhere is there, too
-    existing = [str(path) for path in all_output_paths(options).values() if os.path.lexists(path)]
+    existing = [str(path) for path in all_output_paths(options) if os.path.lexists(path)]
     if existing and not options.force:
         names = "another --output" if options.html is None else "another --output and --report"
         raise UsageError(f"there is already {', '.join(existing)}; give --force to replace, or {names}")
@@ -82,7 +91,7 @@ def open_sinks(
     try:
         for file in files.values():
             claim(file, say)
-        unwritten = [PartialFile(path) for name, path in all_output_paths(options).items() if name not in files]
+        unwritten = [PartialFile(options.mcap.with_suffix(".rrd"))] if not options.rrd else []
         remove_left_over([*unwritten, PartialFile(options.mcap, recovering_name(options.mcap))], say)
         refuse_existing(options)  # once more: another run may have published between the first time and the claim
         for name, file in files.items():
@@ -94,7 +103,7 @@ def open_sinks(
             sink.finish()
         with held_off():
             refuse_existing(options)
-            publish(sinks[: len(files)], list(files.values()), list(all_output_paths(options).values()))
+            publish(sinks[: len(files)], list(files.values()), all_output_paths(options))
             for sink in extra:
                 sink.publish()
     except BaseException:

@@ -6,18 +6,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from mapmerge.outcome import ChangeKind
 from mapmerge.reasons import ReasonCode
 from replay.advice import ADVICE
 from replay.events import Report
 from replay.figures import NO_FIGURE, area, percent, share
 from replay.sinks.rerun_entities import RobotEntities
 from replay.sinks.rerun_text import cell, paragraph
-from replay.words import counted
+from replay.words import JUMPED, STATUS_WORDS, WITHDRAWN, counted
 
 _MOST_SAID = 8
 _MOST_WRONG = 6
-_STATUSES = {"unmerged": "**not merged**", "no_map": "**without a map**"}
-_EVENTS = {"jumped": "jumped in its own frame", "withdrawn": "was withdrawn for a time"}
+_EVENTS = {ChangeKind.JUMPED: JUMPED, ChangeKind.WITHDRAWN: WITHDRAWN}
 
 LEGEND = """\
 - **Walls** are in the colour of the robot that mapped them, and **thin lines** show where it drove.
@@ -82,7 +82,8 @@ def _table(report: Report, robots: Sequence[RobotEntities]) -> str:
 def _is(values: Mapping[str, Any]) -> str:
     if values["placed_via"] is not None and values["merged_from_map"] is not None:
         return f"merged, on {cell(values['placed_via'])}"
-    return _STATUSES.get(values["status"], str(values["status"]))
+    words = STATUS_WORDS[values["status"]]
+    return words if values["merged_from_map"] is not None else f"**{words}**"
 
 
 def _sure(values: Mapping[str, Any]) -> str:
@@ -108,9 +109,10 @@ def _wrong(report: Report) -> list[str]:
     if skipped := sum(report["skipped"].values()):
         causes = ", ".join(f"{count} {cell(cause)}" for cause, count in report["skipped"].items())
         found.append(f"{counted(skipped, 'message')} skipped: {causes}; see *Decisions*")
-    events = [item for item in report["history"] if item["event"] in ("jumped", "withdrawn")]
     found += [
-        f"**{cell(item['robot'])}** {_EVENTS[item['event']]}: {paragraph(item['reason']['message'])}" for item in events
+        f"{_EVENTS[item['event']].format(_bold(item['robot']))}: {paragraph(item['reason']['message'])}"
+        for item in report["history"]
+        if item["event"] in _EVENTS
     ]
     if len(found) > _MOST_WRONG:
         found = [*found[:_MOST_WRONG], f"and {len(found) - _MOST_WRONG} more: see *Decisions*"]
@@ -122,6 +124,10 @@ def _reason(reason: Mapping[str, str]) -> str:
     code = ReasonCode(reason["code"])
     said = f"{paragraph(reason['message'])} (`{code}`)."
     return f"{said} *What to do:* {ADVICE[code]}" if ADVICE[code] else said
+
+
+def _bold(robot: str) -> str:
+    return f"**{cell(robot)}**"
 
 
 def _lately(said: Sequence[Said]) -> Iterator[str]:

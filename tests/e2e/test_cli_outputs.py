@@ -82,6 +82,60 @@ def test_no_recording_of_another_run_stays_beside_the_outputs(replay: Program, t
     assert not (tmp_path / "out.rrd").exists()
 
 
+def test_no_page_of_another_run_stays_beside_the_outputs(replay: Program, two: Path, tmp_path: Path) -> None:
+    merge = ("merge", two, "-o", "out.mcap", "--no-rrd", "--images", "none")
+    assert replay(*merge, "--report", "out.html").status == 0
+    page = (tmp_path / "out.html").read_bytes()
+    assert replay(*merge, "--force").status == 0
+    assert names(tmp_path) == ["out.json", "out.mcap"]
+    # nor one that a run had set aside before it was killed
+    (tmp_path / "out.html.replaced").write_bytes(page)
+    (tmp_path / "other.html").write_bytes(page)
+    assert replay(*merge, "--force").status == 0
+    assert names(tmp_path) == ["other.html", "out.json", "out.mcap"]
+
+
+@pytest.mark.parametrize("kind", ["text", "link", "folder", "page"])
+def test_what_is_no_page_of_ours_stays(replay: Program, two: Path, tmp_path: Path, kind: str) -> None:
+    page = tmp_path / "out.html"
+    mine = '<!DOCTYPE html><html><head><meta name="generator" content="pen and paper"></head></html>'
+    (tmp_path / "mine.txt").write_text(mine)
+    if kind == "folder":
+        page.mkdir()
+    elif kind == "link":
+        page.symlink_to(tmp_path / "mine.txt")
+    else:
+        page.write_text("of an earlier run" if kind == "text" else mine)
+    before = page.lstat().st_ino
+    ran = replay("merge", two, "-o", "out.mcap", "--no-rrd", "--images", "none", "--force")
+    assert ran.status == 0, ran.err
+    assert page.lstat().st_ino == before
+    assert (tmp_path / "mine.txt").read_text() == mine
+
+
+def test_a_page_that_is_not_written_is_no_hindrance(replay: Program, two: Path, tmp_path: Path) -> None:
+    merge = ("merge", two, "-o", "out.mcap", "--no-rrd", "--images", "none")
+    assert replay(*merge, "--report", "out.html").status == 0
+    for name in ("out.mcap", "out.json"):
+        (tmp_path / name).unlink()
+    ran = replay(*merge, "--report", "out.html")
+    assert ran.status == 2
+    assert "there is already out.html" in ran.error
+    assert replay(*merge).status == 0
+    assert names(tmp_path) == ["out.html", "out.json", "out.mcap"]
+
+
+def test_a_page_is_put_back_if_the_run_fails(replay: Program, two: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    merge = ("merge", two, "-o", replay.folder / "out.mcap", "--no-rrd", "--images", "none")
+    assert replay(*merge, "--report", replay.folder / "out.html").status == 0
+    before = contents(replay.folder)
+    refuse_to(monkeypatch, "replace", lambda _, target: Path(target).name == "out.json")
+    assert replay(*merge, "--force").status == 3
+    kept = contents(replay.folder)
+    assert kept["out.html"] == before["out.html"]
+    assert kept["out.mcap"] == before["out.mcap"]
+
+
 def test_a_failed_run_leaves_what_was_there(replay: Program, two: Path) -> None:
     before = replay.merge(two)
     kept = before.mcap.read_bytes()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from importlib import resources
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import jsonschema
 import pytest
@@ -126,26 +128,68 @@ def test_every_topic_is_documented(tmp_path: Path, two: Path) -> None:
     assert all(any(shape.fullmatch(topic) for topic in written) for shape in shapes), documented
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"),
-        *("docs/output-formats.md", "docs/benchmarks.md", "docs/configuration.md"),
-        *("docs/python.md", "docs/index.md", "examples/README.md"),
-        *("docs/tutorial.md", "docs/tuning.md", "docs/faq.md", "docs/comparison.md", "docs/how-it-decides.md"),
-        *("docs/ci.md", "docs/export.md", "docs/method.md", "SECURITY.md"),
-    ],
+DOCUMENTS = sorted(
+    path.relative_to(ROOT).as_posix()
+    for pattern in ("*.md", "docs/**/*.md", "examples/**/*.md", "samples/**/*.md", "benchmarks/**/*.md")
+    for path in ROOT.glob(pattern)
 )
+
+
+def prose(document: Path) -> str:
+    """Return a document without its blocks of code."""
+    return re.sub(r"^(```|~~~).*?^\1", "", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+
+
+def anchors(document: Path) -> set[str]:
+    """Return the places of a document that links may name, as GitHub makes them of headings."""
+    text = prose(document)
+    found = set(re.findall(r'<\w+ (?:id|name)="([^"]+)"', text))
+    taken: Counter[str] = Counter()
+    for heading in re.findall(r"^#{1,6} +(.+?)[ #]*$", text, re.MULTILINE):
+        shown = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", heading)
+        slug = re.sub(r"[^\w\- ]", "", shown.lower()).replace(" ", "-")
+        found.add(f"{slug}-{taken[slug]}" if taken[slug] else slug)
+        taken[slug] += 1
+    return found
+
+
+def broken_links(document: Path) -> list[str]:
+    """Return the links within the repository that lead nowhere, or to no place of a document."""
+    text = re.sub(r"`[^`\n]+`", "", prose(document))
+    links = re.findall(r'\]\(([^)\s]+)(?: "[^"]*")?\)', text) + re.findall(r'(?:href|src|srcset)="([^"]+)"', text)
+    broken = []
+    for link in links:
+        parts = urlsplit(link)
+        if parts.scheme or parts.netloc:
+            continue
+        target = document.parent / unquote(parts.path) if parts.path else document
+        if not target.exists() or (parts.fragment and target.suffix == ".md" and parts.fragment not in anchors(target)):
+            broken.append(link)
+    return broken
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
 def test_links_lead_somewhere(name: str) -> None:
-    document = ROOT / name
-    for target in re.findall(r"\]\(([^)#:]+)\)", document.read_text(encoding="utf-8")):
-        assert (document.parent / target).exists(), target
+    assert broken_links(ROOT / name) == []
 
 
-def test_architecture_names_modules_that_are_there() -> None:
+def test_links_that_lead_nowhere_are_found(tmp_path: Path) -> None:
+    page, other = tmp_path / "page.md", tmp_path / "other.md"
+    other.write_text("# What's `a_b`, and 2?\n\n## Again\n\n## Again\n\n```sh\n# no heading\n```\n", encoding="utf-8")
+    good = ("other.md", "other.md#whats-a_b-and-2", "other.md#again-1", "#here", "https://example.org/x#y", ".")
+    bad = ("gone.md", "other.md#what", "other.md#again-2", "other.md#no-heading", "#there")
+    lines = [f"[words]({link})" for link in (*good, *bad)]
+    page.write_text("\n".join(["## Here", *lines, '<img src="gone.png">']), encoding="utf-8")
+    assert broken_links(page) == [*bad, "gone.png"]
+
+
+@pytest.mark.parametrize("package", ["mapmerge", "replay"])
+def test_architecture_names_each_module_once(package: str) -> None:
     text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
-    for package in ("mapmerge", "replay"):
-        section = text.partition(f"\n## {package}\n")[2].partition("\n## ")[0]
-        rows = "".join(re.findall(r"^\| (`[^|]+) \|", section, re.MULTILINE))
-        for module in re.findall(r"`([a-z_0-9]+(?:\.py|/))`", rows):
-            assert list((ROOT / package).rglob(module.rstrip("/"))), module
+    section = text.partition(f"\n## {package}\n")[2].partition("\n## ")[0]
+    rows = "".join(re.findall(r"^\| (`[^|]+) \|", section, re.MULTILINE))
+    named = Counter(re.findall(r"`([a-z_0-9/]+(?:\.py|/))`", rows))
+    assert [name for name, times in named.items() if times > 1] == []
+    assert [name for name in named if not (ROOT / package / name).exists()] == []
+    there = {path.name for path in (ROOT / package).glob("*.py")} - {"__init__.py", "__main__.py"}
+    assert there - set(named) == set()

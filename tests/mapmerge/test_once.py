@@ -84,6 +84,9 @@ def test_what_is_printed_is_short_and_says_where_and_why():
     assert repr(result) == "<MergeResult map0: reference, map1: merged>"
     assert repr(one).startswith(f"<Grid of {one.cols} × {one.rows} cells of 0.05 m, corner at x ")
     assert str(Sim2(1.0, -2.0, np.pi / 2, 1.25)) == "x 1.00 m, y -2.00 m, yaw 90.0°, scale 1.250"
+    # no zero has a sign, and a scale of 1 but for rounding is none
+    assert str(Sim2(-0.001, -1e-9, -1e-6, 1.0 + 1e-12)) == "x 0.00 m, y 0.00 m, yaw 0.0°"
+    assert Sim2(1.0, -2.0, np.pi / 2, 1.25).in_words(3) == "x 1.000 m, y -2.000 m, yaw 90.00°"
 
 
 def test_all_names_are_listed_before_they_are_asked_for():

@@ -7,6 +7,8 @@ import json
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 import replay
@@ -144,12 +146,89 @@ def test_keywords_are_called_as_settings() -> None:
         ({"stop": "noon"}, "is no time"),
         ({"init_poses": {"r2": (1, 2)}}, "init_poses of r2 has 2 numbers; expected x_m, y_m and yaw_rad"),
         ({"min_confidence": 2.0}, "min_confidence is 2.0"),
-        ({"max_memory": "much"}, "no size"),
+        ({"max_memory": "much"}, "max_memory: 'much' is no size"),
+        ({"max_memory": -5}, "max_memory is -5; expected a number of bytes"),
+        ({"max_memory": 0}, "max_memory: '0' is less than 1 MiB"),
+        ({"max_memory": True}, "max_memory is True"),
+        ({"jobs": 0}, "jobs is 0; expected a number of threads, 1 to 999"),
+        ({"jobs": -1}, "jobs is -1"),
+        ({"jobs": 1.5}, "jobs is 1.5"),
+        ({"jobs": True}, "jobs is True"),
+        ({"start": True}, "start is True, which is no number of seconds"),
+        ({"start": [1]}, r"start is \[1\]"),
+        ({"stop": "noon"}, "stop: 'noon' is no time"),
+        ({"stop": 10**5000}, "stop is a number of too many digits"),
+        ({"reorder_window_s": "abc"}, "reorder_window_s is 'abc'"),
+        ({"reorder_window_s": float("inf")}, "reorder_window_s is inf"),
+        ({"init_poses": {"r2": (1, 2, "a")}}, "init_poses of r2 has 'a' in it; expected numbers"),
+        ({"init_poses": {"r2": (1, 2, float("nan"))}}, "init_poses of r2 has nan in it"),
+        ({"init_poses": {"r2": (10**400, 2, 0)}}, "init_poses of r2 has a number that is too large"),
+        ({"init_poses": {"r2": (1, 2, 90)}}, "init_poses: r2=1.0,2.0,90.0: a yaw of 90 rad"),
+        ({"init_poses": {"r2": 5}}, "init_poses of r2 is 5; expected x_m, y_m and yaw_rad"),
+        ({"init_poses": {"r2": "1,2,3"}}, "init_poses of r2 is '1,2,3'"),
+        ({"init_poses": {2: (1, 2, 3)}}, "init_poses is 2"),
+        ({"init_poses": ["r2"]}, "init_poses is 'r2'; expected InitPose values"),
+        ({"init_poses": 5}, "init_poses is 5"),
+        ({"topics": [5]}, "topics is 5; expected text"),
+        ({"topics": ["r1="]}, "topics: r1=: expected a topic"),
+        ({"topics": {"r1": ""}}, "topics is ''"),
+        ({"topics": 5}, "topics is 5; expected a topic, several"),
+        ({"robots": [1]}, r"robots is \[1\]; expected a list of names"),
+        ({"robots": 1}, "robots is 1; expected a list of names"),
+        ({"robots": []}, r"robots is \[\]; expected a list of names"),
+        ({"images": ""}, "images is ''"),
+        ({"trajectories": ["all"]}, "trajectories is"),
+        ({"method": 5}, "method is 5"),
+        ({"min_confidence": "high"}, "min_confidence is 'high'; expected a number"),
+        ({"config": {"method": "paper"}}, "config is .*; expected a MergeConfig"),
+        ({"strict": "no"}, "strict is 'no'; expected True or False"),
+        ({"use_tf": 1}, "use_tf is 1"),
     ],
 )
 def test_what_does_not_fit_is_refused_at_once(told: dict[str, object], said: str) -> None:
     with pytest.raises(replay.ReplayError, match=said):
         options(**told)
+
+
+@pytest.mark.parametrize("runs", [5, [5], b"a.mcap", [b"a.mcap"], {1: "a.mcap"}, {"": "a.mcap"}, {"r1": None}])
+def test_what_is_no_recording_is_refused(runs: object) -> None:
+    with pytest.raises(replay.UsageError, match="runs is "):
+        replay.merge(runs)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ({"output": 5}, "output is 5; expected a path"),
+        ({"report": 5}, "report is 5; expected a path"),
+        ({"every_s": "1"}, "every_s is '1'"),
+        ({"every_s": -1}, "every_s is -1"),
+        ({"rrd": "no"}, "rrd is 'no'; expected True or False"),
+        ({"force": None}, "force is None"),
+    ],
+)
+def test_what_cannot_be_written_is_refused(tmp_path: Path, told: dict[str, object], said: str) -> None:
+    with pytest.raises(replay.UsageError, match=said):
+        replay.merge(SAMPLE).write(**{"output": tmp_path / "out.mcap", **told})  # type: ignore[arg-type]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_numbers_may_be_those_of_numpy() -> None:
+    poses = {"r2": np.array([1.0, 2.0, 0.5])}
+    told = options(start=np.float32(0.5), jobs=np.int64(2), max_memory=np.int64(1 << 30), init_poses=poses)
+    assert (told.start, told.jobs) == (TimeBound(500_000_000, relative=True), 2)
+    assert told.max_memory_bytes == 1 << 30
+    assert told.init_poses == (replay.InitPose("r2", 1.0, 2.0, 0.5),)
+
+
+def test_threads_of_opencv_are_as_before_a_run(tmp_path: Path) -> None:
+    before = cv2.getNumThreads()
+    try:
+        cv2.setNumThreads(2)
+        replay.merge(SAMPLE, stop=20).write(tmp_path / "b.mcap", rrd=False)
+        assert cv2.getNumThreads() == 2
+    finally:
+        cv2.setNumThreads(before)
 
 
 def test_without_a_recording_there_is_no_run() -> None:

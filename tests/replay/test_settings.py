@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 from dataclasses import fields, is_dataclass
 from decimal import Decimal
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 from mapmerge.config import MergeConfig
 from replay.arguments import command_parser
 from replay.commands import COMMANDS
+from replay.documents import Node
 from replay.errors import UsageError
 from replay.init_pose import InitPose
 from replay.options import OutputOptions, RunOptions, TimeBound
@@ -146,7 +148,7 @@ def test_the_settings_of_a_run_are_those_of_a_file(tmp_path: Path) -> None:
     )
     written = OutputOptions(tmp_path / "x.mcap", every_ns=5, copy_maps=True)
     settings = {**options.settings(), "outputs": written.settings("all")}
-    document = document_of(json.loads(json.dumps(settings)))
+    document = document_of(Node(Path("out.json"), json.loads(json.dumps(settings))))
     assert document["robots"] == ["a", "b"]
     assert document["topics"] == ["a=/x", "/{robot}/map"]
     assert document["time"]["start"] == Decimal("1e-9")
@@ -160,11 +162,65 @@ def test_the_settings_of_a_run_are_those_of_a_file(tmp_path: Path) -> None:
 
 def test_reports_of_runs_that_were_not_written_have_settings_too(tmp_path: Path) -> None:
     settings = {**RunOptions(()).settings(), "outputs": None}
-    assert document_of(settings)["outputs"] == {}
+    assert document_of(Node(Path("out.json"), settings))["outputs"] == {}
     path = tmp_path / "out.json"
     path.write_text(json.dumps({"schema": "replay.report/1", "settings": {}}), encoding="utf-8")
-    with pytest.raises(UsageError, match="not those that a run writes"):
+    with pytest.raises(UsageError, match="not settings that a run writes"):
         read_settings(path, ALL)
+
+
+def nested(depth: int) -> object:
+    found: object = 1
+    for _ in range(depth):
+        found = {"verify": found}
+    return found
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ([], "settings is \\[\\]; expected a mapping"),
+        ("x", "settings is 'x'; expected a mapping"),
+        ({"outputs": [1]}, "settings.outputs is"),
+        ({"outputs": {"every_ns": -1}}, "settings.outputs.every_ns is -1; expected a whole number"),
+        ({"reorder_window_ns": "abc"}, "settings.reorder_window_ns is 'abc'; expected a whole number"),
+        ({"start": {"ns": 10**400, "relative": True}}, "settings.start.ns is .*; expected a whole number"),
+        ({"start": 5}, "settings.start is 5"),
+        ({"stop": {"ns": 1, "relative": "no"}}, "settings.stop.relative is 'no'; expected true or false"),
+        ({"topics": [5]}, "settings.topics.0 is 5"),
+        ({"topics": {}}, "settings.topics is {}; expected a list"),
+        ({"robots": [1]}, "settings.robots.0 is 1; expected a text"),
+        ({"init_poses": [{"robot": "a", "x_m": "b"}]}, "settings.init_poses.0.x_m is 'b'; expected a number"),
+        ({"init_poses": [{"robot": "a"}]}, "settings.init_poses.0 has no 'x_m'"),
+        ({"use_tf": None}, "settings has no 'use_tf'"),
+        ({"max_memory_bytes": True}, "settings.max_memory_bytes is True"),
+        ({"merge": [1]}, "settings.merge is \\[1\\]; expected a mapping"),
+        ({"merge": {"verify": [1]}}, "merge.verify: is a section, and no setting"),
+        ({"merge": nested(900)}, "merge.verify.verify: there is no such setting|its settings are nested too deep"),
+    ],
+)
+def test_settings_that_no_run_wrote_are_refused(tmp_path: Path, change: object, said: str) -> None:
+    path = tmp_path / "out.json"
+    settings = {**RunOptions(()).settings(), **change} if isinstance(change, dict) else change
+    path.write_text(json.dumps({"schema": "replay.report/1", "settings": settings}), encoding="utf-8")
+    with pytest.raises(UsageError, match=rf"^{re.escape(str(path))}: ({said})"):
+        read_settings(path, ALL)
+
+
+@pytest.mark.parametrize(
+    "text", [f"x = {'[' * 3000}{']' * 3000}", f"robots = {'9' * 5000}", f"time.start = {'{a=' * 3000}1{'}' * 3000}"]
+)
+def test_toml_that_cannot_be_read_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "replay.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(UsageError, match="is no TOML: "):
+        read_settings(path, ALL)
+    assert read_assignment(text.replace(" = ", "=").replace("x=", "robots="), ALL)
+
+
+def test_a_number_that_is_too_large_is_none() -> None:
+    with pytest.raises(UsageError, match="expected a number"):
+        merge_fields.read("merge.verify.min_overlap_m2", 10**400, "x")
 
 
 def test_what_adds_to_lists_is_named_for_several() -> None:
