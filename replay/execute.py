@@ -44,11 +44,10 @@ def merge_into(
     from replay.pipeline import drain, events
     from replay.plan import open_plan
 
-    if written is not None:
-        refuse_outputs(written, [item.path for item in options.runs])
     with _own_threads(), open_plan(options) as plan:
         if written is not None:
-            refuse_outputs(written, plan.files())
+            # what is wrong with the inputs is said first: an output that is there already hides nothing
+            refuse_outputs(written, [*(item.path for item in options.runs), *plan.files()])
         planned(plan)
         with opened() as sinks:
             return drain(events(plan, options, written), sinks, options.jobs).report
