@@ -57,6 +57,8 @@ class MergeResult:
         Robots whose map changed in this step.
     changes
         What jumped, or was placed, moved or withdrawn in this step.
+    centres_m
+        Of each robot with a map, the middle of the rectangle around what it knows, in its map frame.
     """
 
     robots: Mapping[str, RobotOutcome]
@@ -67,6 +69,7 @@ class MergeResult:
     merged: Grid | None
     updated: tuple[str, ...]
     changes: tuple[Change, ...]
+    centres_m: Mapping[str, tuple[float, float]]
 
     @property
     def poses(self) -> dict[str, Sim2]:
@@ -117,7 +120,7 @@ class Merger:
         self._reported: dict[str, Sim2] = {}
         waiting = Reason(ReasonCode.NO_MAP, "no map that shows anything yet")
         outcomes = {robot: RobotOutcome(Status.NO_MAP, waiting) for robot in robots}
-        self.result = MergeResult(outcomes, {}, {}, {}, {}, None, (), ())
+        self.result = MergeResult(outcomes, {}, {}, {}, {}, None, (), (), {})
 
     def step(
         self, updates: Mapping[str, Grid], priors: Mapping[str, Prior] | None = None, *, is_last: bool = False
@@ -168,7 +171,8 @@ class Merger:
         outcomes = outcomes_of(robots, pairs, forest, layers, fusion)
         changes = self._changes(outcomes, searched, jumped)
         merged = fusion.grid if fusion else None
-        self.result = MergeResult(outcomes, grids, pairs, believed, searched, merged, updated, changes)
+        centres_m = {robot: self._known[robot].centre_m for robot in self._maps}
+        self.result = MergeResult(outcomes, grids, pairs, believed, searched, merged, updated, changes, centres_m)
         return self.result
 
     @property

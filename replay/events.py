@@ -43,6 +43,8 @@ class RobotInput:
         Which of the run's inputs hold it, as indices.
     message_count
         Messages of its topics.
+    recorded_frame
+        What its map frame was called in the recording, its leading slash stripped; None where it has no name.
     """
 
     robot: str
@@ -51,6 +53,7 @@ class RobotInput:
     clock: Clock
     inputs: tuple[int, ...]
     message_count: int
+    recorded_frame: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

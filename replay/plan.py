@@ -255,6 +255,7 @@ def _robots(
                 for topic in infos[index].topics
                 if topic.name in item.topics and topic.msgtype in (GRID_TYPE, UPDATE_TYPE)
             ),
+            recorded_frame=_bare(frame_ids.get(item.robot)) or None,
         )
         for item in selected
     )

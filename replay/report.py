@@ -1,6 +1,7 @@
 """The report: what became of each robot's map and why, as plain JSON values.
 
-Numbers are rounded to micrometres and microradians, far below what any map can tell, so that reports read well.
+Numbers are rounded to micrometres and nanoradians, far below what any map can tell, so that reports read well. A map
+may lie thousands of kilometres from the origin of its frame, where a microradian is metres.
 What is absent is None. Nothing in a report depends on the machine or on the time of day.
 """
 
@@ -14,7 +15,7 @@ from typing import Any
 from mapmerge.fuse import Agreement
 from mapmerge.match import Match
 from mapmerge.merger import MergeResult
-from mapmerge.outcome import ChangeKind, Pair, RobotOutcome
+from mapmerge.outcome import ChangeKind, Pair
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
 from mapmerge.sim2 import Sim2, wrap_angle
@@ -22,7 +23,8 @@ from replay.events import SCHEMA, Noted, Report, RobotInput, Skipped
 from replay.sources.losses import Listing
 
 _DIGITS = 6
-_MAX_YAW_RAD = 3.141592  # rounded up, π would lie outside (−π, π]
+_TURN_DIGITS = 9
+_MAX_YAW_RAD = 3.141592653  # rounded up, π would lie outside (−π, π]
 
 Json = dict[str, Any]
 
@@ -113,8 +115,7 @@ class ReportBuilder:
             "stamp_ns": stamp_ns,
             "reference": self._robots[0].robot,
             "robots": {
-                item.robot: self._robot(item, result.robots[item.robot], [names[index] for index in item.inputs])
-                for item in self._robots
+                item.robot: self._robot(item, result, [names[index] for index in item.inputs]) for item in self._robots
             },
             "pairs": [
                 {**_pair(pair, match, result.priors.get(pair)), "searched": self._searched.get(pair)}
@@ -149,7 +150,8 @@ class ReportBuilder:
             return Reason(reason.code, "no map that can be used yet, and parts of the recording are lost")
         return reason
 
-    def _robot(self, item: RobotInput, outcome: RobotOutcome, recordings: Collection[str]) -> Json:
+    def _robot(self, item: RobotInput, result: MergeResult, recordings: Collection[str]) -> Json:
+        outcome, centre_m = result.robots[item.robot], result.centres_m.get(item.robot)
         placement = outcome.placement
         return {
             "status": str(outcome.status),
@@ -161,7 +163,9 @@ class ReportBuilder:
             "component": placement.component if placement else None,
             "component_from_map": _pose(placement.component_from_map) if placement else None,
             "placed_via": placement.via if placement else None,
+            "centre_m": None if centre_m is None else [_round(value) for value in centre_m],
             "map_frame": item.frame,
+            "recorded_frame": item.recorded_frame,
             "map_topic": item.topic,
             "first_merged_stamp_ns": self._first_merged_ns.get(item.robot),
             "updates": self._updates[item.robot],
@@ -183,8 +187,8 @@ def _pose(pose: Sim2 | None) -> Json | None:
     return {
         "x_m": _round(pose.x_m),
         "y_m": _round(pose.y_m),
-        "yaw_rad": max(-_MAX_YAW_RAD, min(_MAX_YAW_RAD, _round(wrap_angle(pose.yaw_rad)))),
-        "scale": _round(pose.scale),
+        "yaw_rad": max(-_MAX_YAW_RAD, min(_MAX_YAW_RAD, _round(wrap_angle(pose.yaw_rad), _TURN_DIGITS))),
+        "scale": _round(pose.scale, _TURN_DIGITS),
     }
 
 
@@ -238,6 +242,6 @@ def _share(value: float | None) -> float | None:
     return None if value is None else _round(value)
 
 
-def _round(value: float) -> float:
+def _round(value: float, digits: int = _DIGITS) -> float:
     """Round, and turn −0.0 into 0.0 so that equal values are written alike."""
-    return round(value, _DIGITS) + 0.0
+    return round(value, digits) + 0.0

@@ -37,6 +37,10 @@ class RobotResult:
         When it was placed first, in seconds since the run's first map; None if it never was, or nothing tells.
     map_frame, map_topic
         What its map is called.
+    centre_m
+        The middle of what its map knows, in its map frame; None where nothing tells.
+    recorded_frame
+        What its map frame was called in the recording; None where nothing tells.
     """
 
     robot: str
@@ -50,6 +54,8 @@ class RobotResult:
     merged_after_s: float | None
     map_frame: str
     map_topic: str
+    centre_m: tuple[float, float] | None = None
+    recorded_frame: str | None = None
 
     @property
     def is_placed(self) -> bool:
@@ -164,6 +170,8 @@ def _robot(robot: str, node: Node, first_ns: int | None) -> RobotResult:
         None if merged_ns is None or first_ns is None else (merged_ns - first_ns) / 1e9,
         node.need("map_frame").text(),
         node.need("map_topic").text(),
+        node.maybe("centre_m", Node.place_m),
+        node.maybe("recorded_frame", Node.text),
     )
 
 

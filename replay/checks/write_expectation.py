@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from mapmerge.sim2 import Sim2
 from replay.checks.expectation import WITHIN_DEG, WITHIN_M
+from replay.figures import exact
 from replay.run_result import RobotResult, RunResult
 
 _SHARE_LESS = 0.02
@@ -26,7 +28,7 @@ def _lines(result: RunResult) -> Iterator[str]:
     yield "other_robots: forbidden"
     yield f"max_skipped: {sum(result.skipped.values())}"
     yield "defaults:  # of robots that are to be merged"
-    yield f"  within_m: {WITHIN_M:g}  # of the pose, at the origin of the robot's map frame"
+    yield f"  within_m: {WITHIN_M:g}  # of the pose, at at_m of the robot's map frame: the middle of what its map knows"
     yield f"  within_deg: {WITHIN_DEG:g}"
     yield "robots:"
     for robot in result.robots.values():
@@ -42,11 +44,28 @@ def _robot(robot: RobotResult) -> Iterator[str]:
     else:
         yield f"  {name}:"
         yield "    status: merged"
-        numbers = {"x_m": pose.x_m, "y_m": pose.y_m, "yaw_deg": math.degrees(pose.yaw_rad)}
-        if pose.scale != 1.0:
-            numbers["scale"] = pose.scale
-        yield f"    pose: {{{', '.join(f'{key}: {round(value, _DIGITS) + 0.0}' for key, value in numbers.items())}}}"
+        yield f"    pose: {{{', '.join(f'{key}: {text}' for key, text in _pose(pose, robot.centre_m).items())}}}"
         yield from _limits(robot)
+
+
+def _pose(pose: Sim2, centre_m: tuple[float, float] | None) -> dict[str, str]:
+    """Return a pose, and the point at which it is compared; turned and scaled so exactly that the point stays there."""
+    away_m = 1.0 if centre_m is None else max(1.0, math.hypot(*centre_m))
+    scale_digits = max(_DIGITS, math.ceil(math.log10(away_m)) + _DIGITS)
+    numbers = {
+        "x_m": _number(pose.x_m),
+        "y_m": _number(pose.y_m),
+        "yaw_deg": _number(math.degrees(pose.yaw_rad), max(_DIGITS, scale_digits - 1)),
+    }
+    if pose.scale != 1.0:
+        numbers["scale"] = _number(pose.scale, scale_digits)
+    if centre_m is not None:
+        numbers["at_m"] = f"[{', '.join(map(_number, centre_m))}]"
+    return numbers
+
+
+def _number(value: float, digits: int = _DIGITS) -> str:
+    return exact(round(value, digits) + 0.0)
 
 
 def _limits(robot: RobotResult) -> Iterator[str]:

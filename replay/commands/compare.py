@@ -18,7 +18,7 @@ or lost, or moved; their acceptance, confidence, overlap and time; reasons of re
 A and B are reports, OUT.json, or MCAPs with reports in them, OUT.mcap. They are only read.
 """
 EPILOG = """\
-Poses are compared where the origin of the robot's map frame lies in A's merged frame, and by how the frame is turned.
+Poses are compared in A's merged frame, by where the middle of what the robot's map knows lies, and how it is turned.
 Where the runs were made by other versions, of other inputs or with other settings, a note says so; that is no
 difference.
 

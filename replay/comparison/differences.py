@@ -23,7 +23,7 @@ class Tolerance:
     Parameters
     ----------
     distance_m, angle_deg
-        Of poses: at the origin of the robot's map frame, and of the turn.
+        Of poses: at the middle of what the robot's map knows, and of the turn.
     share
         Of acceptance and confidence; and of scale, as a share of it.
     area_share
@@ -133,12 +133,24 @@ def _of_robot(one: RobotResult, other: RobotResult, frame: Sim2 | None, toleranc
     if one.is_placed != other.is_placed:
         return
     if frame is not None and one.merged_from_map is not None and other.merged_from_map is not None:
-        yield from _moved(one.robot, one.merged_from_map, frame @ other.merged_from_map, tolerance)
+        yield from _moved(
+            one.robot, one.merged_from_map, frame @ other.merged_from_map, _between_m(one, other), tolerance
+        )
     yield from _figures(one, other, tolerance)
 
 
-def _moved(robot: str, one: Sim2, other: Sim2, tolerance: Tolerance) -> Iterator[Difference]:
-    dx_m, dy_m = other.x_m - one.x_m, other.y_m - one.y_m
+def _between_m(one: RobotResult, other: RobotResult) -> tuple[float, float]:
+    """Return where positions are compared: the origin of the map frame may be far from the map.
+
+    That is between the middles of what the map knew in both runs, or the one that is known; the origin if none is.
+    """
+    known_m = [centre_m for centre_m in (one.centre_m, other.centre_m) if centre_m is not None] or [(0.0, 0.0)]
+    return sum(x_m for x_m, _ in known_m) / len(known_m), sum(y_m for _, y_m in known_m) / len(known_m)
+
+
+def _moved(robot: str, one: Sim2, other: Sim2, at_m: tuple[float, float], tolerance: Tolerance) -> Iterator[Difference]:
+    (x_m, y_m), (to_x_m, to_y_m) = one.apply_point(*at_m), other.apply_point(*at_m)
+    dx_m, dy_m = to_x_m - x_m, to_y_m - y_m
     turn_deg = math.degrees(wrap_angle(other.yaw_rad - one.yaw_rad))
     ratio = other.scale / one.scale
     is_same_place = math.hypot(dx_m, dy_m) <= tolerance.distance_m

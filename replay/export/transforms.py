@@ -34,6 +34,8 @@ def _robot(robot: RobotResult, ros: int) -> Iterator[str]:
             f"resolution is off by that factor; else {_place(pose)}"
         )
     else:
+        if robot.recorded_frame is not None and robot.recorded_frame != robot.map_frame:
+            yield _comment(f"{robot.map_frame} is what {robot.robot} recorded as '{robot.recorded_frame}'")
         yield _command(pose, robot.map_frame, ros)
 
 
@@ -47,7 +49,8 @@ def _place(pose: Sim2) -> str:
 
 
 def _command(pose: Sim2, frame: str, ros: int) -> str:
-    x, y, yaw = (f"{value + 0.0:.6f}" for value in (pose.x_m, pose.y_m, pose.yaw_rad))
+    x, y = f"{pose.x_m + 0.0:.6f}", f"{pose.y_m + 0.0:.6f}"
+    yaw = f"{pose.yaw_rad + 0.0:.9f}"  # a map may be so far from its frame's origin that a microradian is metres
     child = shlex.quote(plain(frame))
     if ros == 1:
         return f"rosrun tf2_ros static_transform_publisher {x} {y} 0 {yaw} 0 0 {MERGED_FRAME} {child}"

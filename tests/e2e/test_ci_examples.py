@@ -16,6 +16,7 @@ from typing import Any
 import cv2
 import pytest
 from junitparser import JUnitXml
+from packaging.requirements import Requirement
 from ruamel.yaml import YAML
 
 from tests.data_paths import ROOT
@@ -114,7 +115,9 @@ def test_a_check_that_holds(runner: Runner, work: Path) -> None:
         ran = runner.run(script, work)
         assert ran.returncode == 0, ran.stdout + ran.stderr
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert runner.installed == f"install {project['name']}\n"
+    wanted = Requirement(runner.installed.strip().removeprefix("install "))
+    assert wanted.name == project["name"]
+    assert wanted.url == "git+https://example.com/OWNER/replay@TAG"  # no package index has it
     (suite,) = JUnitXml.fromfile(str(work / "replay.xml"))
     assert (suite.tests, suite.failures) == (10, 0)
     assert "all 10 expectations hold" in runner.summary.read_text(encoding="utf-8")

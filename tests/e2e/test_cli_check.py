@@ -10,10 +10,13 @@ from pathlib import Path
 import pytest
 from junitparser import JUnitXml
 
+from mapmerge.sim2 import Sim2
 from replay.arguments import command_parser
+from replay.checks.expectation import load_expectation
 from tests.bags import write_mcap
+from tests.floors import in_frame
 from tests.program import Program, Ran, in_process_of_its_own
-from tests.runs import bare_room, in_log_order, reference_from, seen, two_robots
+from tests.runs import bare_room, flat_map, in_log_order, reference_from, seen, two_robots
 
 TRUE = reference_from("r2")
 POSE = f"{{x_m: {TRUE.x_m}, y_m: {TRUE.y_m}, yaw_rad: {TRUE.yaw_rad}, within_m: 0.2, within_deg: 1}}"
@@ -417,3 +420,32 @@ def test_of_a_recording_that_cannot_be_read_no_flag_is_blamed(replay: Program, t
     ran = checked(replay, tmp_path / "bad.mcap", "robots: {r1: reference}", "--method", "paper")
     assert ran.status == 2
     assert ran.error.startswith(f"{tmp_path / 'bad.mcap'}: ")
+
+
+def test_expectations_of_maps_far_from_the_origin_of_their_frame_are_of_where_they_are(
+    replay: Program, tmp_path: Path
+) -> None:
+    east_m, north_m = 4.6e5, 5.5e6  # as in UTM
+    there = Sim2(east_m, north_m, 0.3)
+    maps = {robot: in_frame(flat_map(robot), there) for robot in ("r1", "r2")}
+    run = write_mcap(tmp_path / "utm.mcap", [seen(robot, 0.0, grid) for robot, grid in maps.items()])
+    report = replay.merge(run).report
+    middle_m = maps["r2"].middle_m
+    assert report["robots"]["r2"]["status"] == "merged"
+    assert report["robots"]["r2"]["centre_m"] == pytest.approx(middle_m, abs=1e-5)
+    assert replay("check", "out.json", "--write-expect", "expect.yaml").status == 0
+    expected = load_expectation(replay.folder / "expect.yaml").robots["r2"].pose
+    assert expected is not None
+    assert expected.at_m == pytest.approx(middle_m, abs=1e-3)
+    assert (expected.within_m, expected.within_deg) == (0.1, 0.5)
+    pose = report["robots"]["r2"]["merged_from_map"]
+    found = Sim2(pose["x_m"], pose["y_m"], pose["yaw_rad"])
+    assert expected.merged_from_map.apply_point(*middle_m) == pytest.approx(found.apply_point(*middle_m), abs=5e-3)
+    # a turn that nobody sees moves the origin by many metres
+    turned = Sim2(0.0, 0.0, pose["yaw_rad"] + 2e-5)
+    (x_m, y_m), (from_x_m, from_y_m) = found.apply_point(*middle_m), turned.apply_point(*middle_m)
+    pose |= {"x_m": x_m - from_x_m, "y_m": y_m - from_y_m, "yaw_rad": turned.yaw_rad}
+    (replay.folder / "turned.json").write_text(json.dumps(report), encoding="utf-8")
+    for name in ("out.json", "turned.json"):
+        ran = replay("check", name, "--expect", "expect.yaml")
+        assert ran.status == 0, ran.out

@@ -9,6 +9,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from mapmerge.sim2 import Sim2
@@ -91,10 +92,47 @@ def test_what_is_within_the_tolerance_is_no_difference(replay: Program, report: 
 
 
 def test_tells_by_how_much_in_numbers(replay: Program, report: dict[str, Any]) -> None:
-    ran = compared(replay, report, changed(report, shift(0.25, -2.0)), "--json")
-    (moved,) = json.loads(ran.out)["differences"]
+    after = changed(report, shift(0.25, -2.0))
+    x_m, y_m = np.subtract(*(seen_at(each, report["robots"]["r2"]["centre_m"]) for each in (after, report)))
+    (moved,) = json.loads(compared(replay, report, after, "--json").out)["differences"]
+    expected = {"distance_m": math.hypot(x_m, y_m), "dx_m": x_m, "dy_m": y_m, "turn_deg": -2.0, "scale_ratio": 1.0}
+    assert moved["amounts"] == pytest.approx(expected, abs=1e-6)
+
+
+def test_reports_without_a_middle_are_compared_at_the_origin(replay: Program, report: dict[str, Any]) -> None:
+    older = changed(report, without_middle)
+    (moved,) = json.loads(compared(replay, older, changed(older, shift(0.25, -2.0)), "--json").out)["differences"]
     expected = {"distance_m": 0.25, "dx_m": 0.25, "dy_m": 0.0, "turn_deg": -2.0, "scale_ratio": 1.0}
     assert moved["amounts"] == pytest.approx(expected, abs=1e-6)
+
+
+def without_middle(report: dict[str, Any]) -> None:
+    for robot in report["robots"].values():
+        del robot["centre_m"]
+
+
+def test_a_map_far_from_the_origin_of_its_frame_is_compared_where_it_is(
+    replay: Program, report: dict[str, Any]
+) -> None:
+    centre_m = (4.6e6, 3.0e5)
+
+    def turned_there(other: dict[str, Any]) -> None:
+        robot = other["robots"]["r2"]
+        pose = Sim2(0.0, 0.0, robot["merged_from_map"]["yaw_rad"] + 2e-5)
+        there = np.subtract(seen_at(other, centre_m), pose.apply_point(*centre_m))
+        robot["merged_from_map"] |= {"x_m": there[0], "y_m": there[1], "yaw_rad": pose.yaw_rad}
+
+    far = changed(report, lambda other: other["robots"]["r2"].update(centre_m=list(centre_m)))
+    assert compared(replay, far, changed(far, turned_there)).status == 0
+    assert (
+        compared(replay, changed(far, without_middle), changed(changed(far, turned_there), without_middle)).status == 1
+    )
+
+
+def seen_at(report: dict[str, Any], at_m: tuple[float, float]) -> tuple[float, float]:
+    """Return where a point of r2's map frame lies in the merged frame."""
+    pose = report["robots"]["r2"]["merged_from_map"]
+    return Sim2(pose["x_m"], pose["y_m"], pose["yaw_rad"], pose["scale"]).apply_point(*at_m)
 
 
 def test_a_reason_that_changed_is_a_difference(replay: Program, report: dict[str, Any]) -> None:

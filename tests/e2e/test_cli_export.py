@@ -199,9 +199,11 @@ def test_transforms_are_commands_for_the_shell(replay: Program, tmp_path: Path) 
     out = replay.merge(mixed)
     ran = replay("export", out.mcap, "--to", "tf")
     assert (ran.status, ran.err) == (0, "")
-    _, *lines, unplaced = ran.out.splitlines()
+    _, *all_lines, unplaced = ran.out.splitlines()
+    comments, lines = all_lines[::2], all_lines[1::2]
+    assert comments == [f"# {robot}/map is what {robot} recorded as 'map'" for robot in ("r1", "r2")]
     assert unplaced.startswith("# r3 is not placed: ")
-    assert replay("export", out.report_path, "--to", "tf").out.splitlines()[1:] == [*lines, unplaced]
+    assert replay("export", out.report_path, "--to", "tf").out.splitlines()[1:] == [*all_lines, unplaced]
     for robot, line in zip(("r1", "r2"), lines, strict=True):
         words = shlex.split(line)
         assert words[:4] == ["ros2", "run", "tf2_ros", "static_transform_publisher"]
@@ -216,10 +218,11 @@ def test_transforms_are_commands_for_the_shell(replay: Program, tmp_path: Path) 
 def test_transforms_for_ros_1_and_of_some_robots_and_to_a_file(replay: Program, outcome: Path) -> None:
     ran = replay("export", outcome, "--to", "tf", "--ros", "1", "--robots", "r2", "-o", "tf.sh")
     assert (ran.status, ran.out) == (0, "")
-    comment, line = (replay.folder / "tf.sh").read_text(encoding="utf-8").splitlines()
+    comment, renamed, line = (replay.folder / "tf.sh").read_text(encoding="utf-8").splitlines()
     assert comment.startswith("# floor.mcap: ")
+    assert renamed == "# r2/map is what r2 recorded as 'map'"
     number = r"-?\d+\.\d{6}"
-    command = rf"rosrun tf2_ros static_transform_publisher {number} {number} 0 {number} 0 0 merged r2/map"
+    command = rf"rosrun tf2_ros static_transform_publisher {number} {number} 0 {number}\d{{3}} 0 0 merged r2/map"
     assert re.fullmatch(command, line)
 
 
@@ -234,9 +237,10 @@ def test_a_scale_is_no_transform(replay: Program, outcome: Path) -> None:
     report["robots"]["r2"]["merged_from_map"]["scale"] = 1.25
     report["robots"]["r1"]["map_frame"] = "map; rm -rf"
     (replay.folder / "scaled.json").write_text(json.dumps(report), encoding="utf-8")
-    _, first, second = replay("export", "scaled.json", "--to", "tf").out.splitlines()
+    _, renamed, first, second = replay("export", "scaled.json", "--to", "tf").out.splitlines()
     assert second.startswith("# r2 is placed with a scale of 1.250000, which no transform can say")
     assert shlex.split(first)[-1] == "map; rm -rf"
+    assert renamed == "# map; rm -rf is what r1 recorded as 'map'"
 
 
 def test_nothing_is_replaced_unless_that_is_said(replay: Program, outcome: Path) -> None:
@@ -382,7 +386,7 @@ def test_comments_stay_comments_whatever_names_are_in_them(replay: Program, outc
     ran = replay("export", path, "--to", "tf")
     assert (ran.status, ran.err) == (0, "")
     lines = ran.out.split("\n")
-    assert [line[:2] for line in lines] == ["# ", "ro", "# ", ""]
+    assert [line[:2] for line in lines] == ["# ", "# ", "ro", "# ", ""]
     assert "".join(lines).isprintable()
 
 

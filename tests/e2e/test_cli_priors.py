@@ -91,7 +91,7 @@ class TestInitPose:
         assert set(matcher.priors) == {expected}
         told = ran.robots["r2"]["prior"]
         assert told == {
-            "pose": {"x_m": 1.5, "y_m": -2.0, "yaw_rad": 1.570796, "scale": 1.0},
+            "pose": {"x_m": 1.5, "y_m": -2.0, "yaw_rad": 1.570796327, "scale": 1.0},
             "sigma": {"x_m": 0.5, "y_m": 0.6, "yaw_rad": 0.087266},
             "origin": "given for r2",
         }
