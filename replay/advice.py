@@ -48,7 +48,7 @@ ADVICE: Mapping[ReasonCode, str] = {
         "maps share more. If it is another place, the refusal is right."
     ),
     ReasonCode.PRIOR_CONTRADICTED: (
-        "The pose that was given is wrong, or the map is; the reason says where the maps do fit. See whether "
+        "The pose that was given is wrong, or the map is: the reason may say where the maps do fit. See whether "
         "the pose is that of the map frame, not of the robot, and its yaw in radians (`90deg` says degrees); "
         "correct `--init-pose`, or leave it or `--use-tf` out."
     ),
