@@ -19,6 +19,8 @@ from replay.topics import REPORT_TOPIC
 
 MOST_BYTES = 256 << 20
 _HEAD_BYTES = 4096
+_RECORDINGS = (b"#ROSBAG V", b"SQLite format 3\0", b"\x28\xb5\x2f\xfd")
+_RERUN = b"RRF"
 _EXPECTED = "expected a report that `replay merge` wrote: OUT.json, or OUT.mcap"
 
 
@@ -53,6 +55,7 @@ def read_report(path: str | os.PathLike[str], at: TimeBound | None = None) -> Re
         return _from_mcap(path, at)
     if at is not None:
         raise InputError(f"{path}: this holds the final report alone; give OUT.mcap for an earlier time")
+    _refuse_recording(path)
     with translated(path):
         size = path.stat().st_size
         if size > MOST_BYTES:
@@ -93,11 +96,20 @@ def _head(path: Path) -> bytes:
             return file.read(_HEAD_BYTES)
 
 
+def _refuse_recording(path: Path) -> None:
+    """Say what to give instead of a recording of maps, or of Rerun's."""
+    head = _head(path)
+    if head.startswith(_RECORDINGS):
+        raise InputError(f"{path}: this is a recording; {_EXPECTED}; to make one: replay merge {path}")
+    if head.startswith(_RERUN):
+        raise InputError(f"{path}: this is a Rerun recording; {_EXPECTED}, which stand beside it")
+
+
 def _from_mcap(path: Path, at: TimeBound | None) -> Report:
     last: Report | None = None
     with _ReportFile(path, most_bytes=MOST_BYTES) as file:
         if not any(topic.name == REPORT_TOPIC for topic in file.info.topics):
-            raise InputError(f"{path}: it holds no {REPORT_TOPIC}; {_EXPECTED}")
+            raise InputError(f"{path}: it holds no {REPORT_TOPIC}; {_EXPECTED}; to make one: replay merge {path}")
         for report in _reports(file):
             if at is not None and report["stamp_ns"] is not None and report["stamp_ns"] > _bound_ns(path, report, at):
                 break

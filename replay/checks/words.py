@@ -46,5 +46,10 @@ def summary(found: Sequence[Finding], title: str) -> str:
     return "\n".join([f"### replay check: {_cell(title)}", "", _cell(count(found)), *head, *table, ""]) + "\n"
 
 
+def error_summary(message: str, title: str) -> str:
+    """Return a section of Markdown that says why nothing could be checked."""
+    return f"### replay check: {_cell(title)}\n\n{_cell(FAILS)} nothing was checked: {_cell(message)}\n\n"
+
+
 def _cell(text: str) -> str:
     return plain(text).translate(_MARKDOWN)

@@ -96,14 +96,14 @@ def _check(options: argparse.Namespace) -> int:
     from replay.checks.expectation import load_expectation
     from replay.checks.findings import findings
 
-    expectation = load_expectation(options.expect)  # before anything long begins
     _refuse_files(options)
     try:
+        expectation = load_expectation(options.expect)  # before anything long begins
         result, report = _result(options)
         found = findings(expectation, result)
         _write_findings(found, options)
     except ReplayError as error:
-        if options.junit is not None and not isinstance(error, OutputError):
+        if not isinstance(error, OutputError):
             _write_error(str(error), options)
         raise
     _tell(found, report, options)
@@ -174,7 +174,9 @@ def _merged(options: argparse.Namespace) -> Report:
 
 def _written(options: argparse.Namespace) -> OutputOptions | None:
     """Return what is written of the run; None for nothing."""
-    if options.output is None and options.report is None:
+    if options.output is None:
+        if options.report is not None:
+            raise UsageError("--report stands beside what else a run writes: give --output OUT.mcap as well")
         return None
     return outputs.output_options(options, inputs.run_options(options))
 
@@ -213,24 +215,33 @@ def _refuse_files(options: argparse.Namespace) -> None:
 def _write_findings(found: Sequence[Finding], options: argparse.Namespace) -> None:
     from replay.checks.junit import junit_xml
     from replay.checks.words import summary
-    from replay.sinks.partial_file import output_errors
     from replay.written_files import write_files
 
     title = ", ".join(Path(text).name for text in options.runs)
     if options.junit is not None:
         write_files({options.junit: junit_xml(found, title)}, force=True)
-    if options.summary:
-        path = Path(options.summary)
-        with output_errors(path), path.open("a", encoding="utf-8") as file:
-            file.write(summary(found, title))
+    _append_summary(summary(found, title), options)
 
 
 def _write_error(message: str, options: argparse.Namespace) -> None:
+    """Say where the findings would stand why there are none: a job that ends red is to tell why."""
     from replay.checks.junit import junit_error_xml
+    from replay.checks.words import error_summary
     from replay.written_files import write_files
 
     title = ", ".join(Path(text).name for text in options.runs)
-    write_files({options.junit: junit_error_xml(message, title)}, force=True)
+    if options.junit is not None:
+        write_files({options.junit: junit_error_xml(message, title)}, force=True)
+    _append_summary(error_summary(message, title), options)
+
+
+def _append_summary(text: str, options: argparse.Namespace) -> None:
+    from replay.sinks.partial_file import output_errors
+
+    if options.summary:
+        path = Path(options.summary)
+        with output_errors(path), path.open("a", encoding="utf-8") as file:
+            file.write(text)
 
 
 def _tell(found: Sequence[Finding], report: Report, options: argparse.Namespace) -> None:

@@ -200,7 +200,7 @@ def _notes(before: RunResult, after: RunResult, frame: Sim2 | None) -> Iterator[
     if one_digests != other_digests:
         one_left, other_left = Counter(one_digests), Counter(other_digests)
         names = sorted({name for name, _ in (*(one_left - other_left), *(other_left - one_left))})
-        yield f"the inputs are not the same: {', '.join(names)}"
+        yield f"what was used of the inputs is not the same: {', '.join(names)}"
     one, other = ({**run.settings, _WRITTEN: None} for run in (before, after))
     changed = sorted(_changed(one, other))
     if changed:

@@ -449,3 +449,18 @@ def test_expectations_of_maps_far_from_the_origin_of_their_frame_are_of_where_th
     for name in ("out.json", "turned.json"):
         ran = replay("check", name, "--expect", "expect.yaml")
         assert ran.status == 0, ran.out
+
+
+def test_a_job_that_cannot_begin_tells_why(replay: Program, tmp_path: Path, two: Path) -> None:
+    junit, told = tmp_path / "out.xml", tmp_path / "summary.md"
+    written = ("--junit", junit, "--summary", told)
+    assert replay("check", two, "--expect", tmp_path / "none.yaml", *written).status == 2
+    assert replay("check", tmp_path / "none.bag", "--expect", tmp_path / "none.yaml", *written).status == 2
+    assert "does not exist" in junit.read_text(encoding="utf-8")
+    assert told.read_text(encoding="utf-8").count("nothing was checked: ") == 2
+
+
+def test_a_page_without_the_other_outputs_is_refused(replay: Program, tmp_path: Path, two: Path) -> None:
+    ran = replay("check", two, "--write-expect", tmp_path / "e.yaml", "--report", tmp_path / "page.html")
+    assert "give --output OUT.mcap as well" in ran.error
+    assert not list(tmp_path.glob("*.html"))

@@ -166,7 +166,7 @@ def test_a_robot_that_is_new_appeared(replay: Program, outcome: Path) -> None:
     ran = replay("compare", outcome, replay.merge(more).mcap)
     assert ran.status == 1
     assert "r3     appeared" in ran.out
-    assert "note: the inputs are not the same: more.mcap, two.mcap" in ran.out
+    assert "note: what was used of the inputs is not the same: more.mcap, two.mcap" in ran.out
 
 
 def test_other_settings_and_versions_are_named_and_no_difference(replay: Program, report: dict[str, Any]) -> None:
@@ -264,3 +264,10 @@ def test_poses_are_equal_however_the_turn_is_written(replay: Program, report: di
     turned = Sim2(yaw_rad=report["robots"]["r2"]["merged_from_map"]["yaw_rad"] + math.tau).yaw_rad
     same = changed(report, lambda other: other["robots"]["r2"]["merged_from_map"].update(yaw_rad=turned - math.tau))
     assert compared(replay, report, same, "--tolerance-deg", "0.001").status == 0
+
+
+@pytest.mark.parametrize(("head", "said"), [(b"#ROSBAG V2.0\n", "replay merge"), (b"RRF2", "a Rerun recording")])
+def test_a_recording_is_no_outcome(replay: Program, tmp_path: Path, head: bytes, said: str) -> None:
+    path = tmp_path / "run.bag"
+    path.write_bytes(head + bytes(100))
+    assert said in replay("compare", path, path).error
