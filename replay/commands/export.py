@@ -12,7 +12,7 @@ from replay.errors import UsageError
 from replay.exit_status import EXIT_DONE
 from replay.export import MODES, TARGETS, TRANSFORMS
 from replay.flags.values import read_flag
-from replay.plain_text import plain
+from replay.plain_text import listed, plain
 from replay.standard_streams import printing, say
 
 if TYPE_CHECKING:
@@ -181,7 +181,16 @@ def _chosen(options: argparse.Namespace, at: TimeBound | None) -> Maps:
         return placed_maps(result, _robots(options.robots, result), recordings, at, _say)
     if options.file.suffix == ".json" and is_run:
         raise UsageError(f"{options.file}: a report holds no map; give OUT.mcap, or --robots and --maps")
+    if is_run and options.topic is None:
+        _say_who_is_missing(_run_result(options.file, at))
     return one_map(options.file, options.topic, at, _say)
+
+
+def _say_who_is_missing(result: RunResult) -> None:
+    """Name the robots whose maps are not in the merged map: by itself it does not show that."""
+    left = [robot for robot, found in result.robots.items() if found.merged_from_map is None]
+    if left:
+        say(f"replay: not in the merged map: {listed([plain(robot) for robot in left])}; the report says why")
 
 
 def _run_result(path: Path, at: TimeBound | None) -> RunResult:

@@ -367,7 +367,7 @@ def test_help_has_the_words_of_an_expectation() -> None:
         ("-o", "out.mcap", "--junit", "out.json"),
         ("-o", "out.mcap", "--junit", "./out.rrd"),
         ("-o", "out.mcap", "--junit", "out.mcap.partial"),
-        ("--report", "out.html", "--summary", "out.html"),
+        ("-o", "other.mcap", "--report", "out.html", "--summary", "out.html"),
         ("--junit", "same", "--summary", "same"),
         ("--junit", "same", "--summary", "same.partial"),
         ("-o", "out.mcap", "--junit", "linked.json"),

@@ -412,3 +412,11 @@ def test_a_name_that_no_file_can_have_is_refused(replay: Program, outcome: Path,
     assert ran.status == 2
     assert "expected a name of files, such as " in ran.error
     assert [path.name for path in replay.folder.rglob("*")] == ["there"]
+
+
+def test_who_is_not_in_the_merged_map_is_said(replay: Program, tmp_path: Path) -> None:
+    run = write_mcap(tmp_path / "run.mcap", in_log_order(growing("r1"), [seen("r2", 30.0, bare_room())]))
+    assert replay("merge", run, "--no-rrd", "-o", tmp_path / "out.mcap").status == 0
+    ran = replay("export", tmp_path / "out.mcap", "-o", tmp_path / "floor")
+    assert ran.status == 0
+    assert "not in the merged map: r2;" in ran.err
