@@ -120,7 +120,7 @@ def test_as_of_a_time(replay: Program, outcome: Path) -> None:
     assert np.array_equal(loaded(replay.folder / "early.yaml").cells, early.cells)
     assert np.array_equal(loaded(replay.folder / "same.yaml").cells, early.cells)
     assert np.array_equal(loaded(replay.folder / "late.yaml").cells, every[-1].grid.cells)
-    assert "no map by that time" in replay("export", outcome, "--at", "1ns", "-o", "never").error
+    assert "the run begins after that time" in replay("export", outcome, "--at", "1ns", "-o", "never").error
 
 
 def test_any_map_of_any_recording_with_its_updates(replay: Program, tmp_path: Path) -> None:
