@@ -154,7 +154,7 @@ class _Writer:
         self._say_waiting()
         for entry in text.outcome(event.report):
             self._say(entry)
-        self._show_pages(event.report)
+        self._show_pages(event.report, is_last=True)
         self.stream.log(ABOUT, rr.TextDocument(text.about(event.report), media_type=_MARKDOWN), static=True)
 
     def _show_picture(self, item: RobotPicture) -> None:
@@ -169,8 +169,8 @@ class _Writer:
             if pair is not None:
                 self._show_page(self._robots[robot].candidates, candidates(event.report, pair))
 
-    def _show_pages(self, report: Report) -> None:
-        self._show_page(SUMMARY, summary(report, list(self._robots.values()), self._said))
+    def _show_pages(self, report: Report, *, is_last: bool = False) -> None:
+        self._show_page(SUMMARY, summary(report, list(self._robots.values()), self._said, is_last=is_last))
         self._show_page(ROBOTS, text.robots_table(report))
         self._show_page(SKIPPED, text.skipped_table(report))
 

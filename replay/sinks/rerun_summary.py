@@ -39,7 +39,7 @@ class Said:
         return f"+{self.since_s:.1f} s"
 
 
-def summary(report: Report, robots: Sequence[RobotEntities], said: Sequence[Said]) -> str:
+def summary(report: Report, robots: Sequence[RobotEntities], said: Sequence[Said], *, is_last: bool = False) -> str:
     """Return the page as of now, in Markdown.
 
     It does not say when that is, which the time line shows: so it stays the same while nothing happens.
@@ -52,10 +52,16 @@ def summary(report: Report, robots: Sequence[RobotEntities], said: Sequence[Said
         The robots, the reference first.
     said
         The log so far.
+    is_last
+        Whether the run has ended: before that, a map that is not merged may be yet.
     """
     parts = [f"# {_headline(report)}", f"in the map frame of **{cell(robots[0].robot)}**, the reference"]
     parts.append(_table(report, robots))
-    parts += ["### What went wrong", *_items(_wrong(report), "Nothing: no map was refused, nothing was skipped.")]
+    nothing = (
+        "Nothing: no map was refused, nothing was skipped." if is_last else "All maps are, and nothing was skipped."
+    )
+    heading = "What went wrong" if is_last else "Not merged yet, or skipped"
+    parts += [f"### {heading}", *_items(_wrong(report, is_last=is_last), nothing)]
     parts += ["### Decisions", *_items(_lately(said), "None yet.")]
     return "\n\n".join(parts) + "\n"
 
@@ -99,10 +105,10 @@ def _overlap(values: Mapping[str, Any]) -> str:
     return area(values["overlap_m2"]) if is_placed else NO_FIGURE
 
 
-def _wrong(report: Report) -> list[str]:
+def _wrong(report: Report, *, is_last: bool) -> list[str]:
     """Say which robots are not merged and why, what jumped or was withdrawn, and how much was skipped."""
     found = [
-        f"**{cell(robot)}** is not merged: {_reason(values['reason'])}"
+        f"**{cell(robot)}** is not merged: {_reason(values['reason'], is_last=is_last)}"
         for robot, values in report["robots"].items()
         if values["merged_from_map"] is None
     ]
@@ -119,11 +125,11 @@ def _wrong(report: Report) -> list[str]:
     return found
 
 
-def _reason(reason: Mapping[str, str]) -> str:
+def _reason(reason: Mapping[str, str], *, is_last: bool) -> str:
     """Return a reason in words, its code, and what may be done, in which commands are in backquotes."""
     code = ReasonCode(reason["code"])
     said = f"{paragraph(reason['message'])} (`{code}`)."
-    return f"{said} *What to do:* {ADVICE[code]}" if ADVICE[code] else said
+    return f"{said} *What to do:* {ADVICE[code]}" if is_last and ADVICE[code] else said
 
 
 def _bold(robot: str) -> str:
