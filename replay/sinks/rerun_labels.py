@@ -20,6 +20,8 @@ _FROM_LABELS = 0.5
 _RASTER_CELLS = 96
 _MOST_PLACES = 128
 _LEAST_CELL_M = 1e-6
+_SAMPLES = 8
+"""Cells across a square of which it is told whether it is known, where a map has as many."""
 
 
 def known_places_m(grid: Grid) -> Points:
@@ -27,9 +29,11 @@ def known_places_m(grid: Grid) -> Points:
 
     They are the middles of squares that it knows altogether or, where it knows none so, of those that it knows best.
     """
-    known = (grid.cells >= 0).astype(np.float32)
-    if known.size == 0:
+    if grid.cells.size == 0:
         return np.empty((0, 2))
+    # a sample of a large map does: this is done for each that comes
+    stride = max(1, max(grid.cells.shape) // (_SIDE_CELLS * _SAMPLES))
+    known = (grid.cells[::stride, ::stride] >= 0).astype(np.float32)
     step = max(grid.cells.shape) / _SIDE_CELLS
     size = max(1, round(grid.cols / step)), max(1, round(grid.rows / step))
     share = cv2.resize(known, size, interpolation=cv2.INTER_AREA)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 import rerun as rr
 
@@ -130,7 +131,7 @@ class MapScene:
             path,
             rr.GridMap(
                 # Row 0 has the lowest y in a map, and is the top one in a picture.
-                data=self._shades[shown.cells.view(np.uint8)[::-1]].tobytes(),
+                data=cv2.LUT(shown.cells.view(np.uint8), self._shades)[::-1].tobytes(),
                 format=rr.components.ImageFormat(
                     width=shown.cols, height=shown.rows, color_model="L", channel_datatype="U8"
                 ),

@@ -14,7 +14,7 @@ from mapmerge.warp import Layer
 from replay.sinks.rerun_entities import OVERLAP
 from replay.sinks.rerun_stream import RrdStream
 
-MAX_SIDE_CELLS = 2048
+MAX_SIDE_CELLS = 1024
 """Larger maps are compared in larger cells: it is a tint."""
 
 _HEIGHT_M = 0.3
