@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cases import Case
-from benchmarks.data import read_truth
 from benchmarks.published import MapSet, map_sets
 from benchmarks.recordings import RECORDINGS, last_grids
 from mapmerge.config import MergeConfig
@@ -17,6 +16,7 @@ from mapmerge.grid import Grid
 from mapmerge.prepare import prepare
 from mapmerge.sim2 import Sim2
 from mapmerge.verify import Scores, verify
+from replay.evaluation.truth import load_truth
 
 _SHARES = (0.1, 0.25, 0.5, 0.75, 0.9)
 
@@ -54,7 +54,7 @@ def of_recordings(folder: Path) -> Iterator[Scored]:
         stem = name.partition(".")[0]
         grids = last_grids(folder / name)
         reference = next(iter(grids))
-        for robot, truth in read_truth(folder / f"{stem}.truth.json").items():
+        for robot, truth in load_truth(folder / f"{stem}.truth.json").robots.items():
             if truth.reference_from_map is not None:
                 pose = truth.reference_from_map
                 yield scored("recordings", f"{stem} {robot}", grids[reference], grids[robot], pose)

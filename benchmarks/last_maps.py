@@ -10,12 +10,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.data import VARIABLE, data_folder, read_truth
+from benchmarks.data import VARIABLE, data_folder
 from benchmarks.methods import load_method, names
 from benchmarks.recordings import BENT, RECORDINGS, last_grids
-from benchmarks.verdicts import MAX_ERROR_CELLS, MAX_ERROR_CELLS_BENT, Tolerance, Verdict, error_of, verdict
+from benchmarks.verdicts import MAX_ERROR_CELLS, MAX_ERROR_CELLS_BENT, Tolerance, Verdict, verdict
 from mapmerge.grid import Grid
 from mapmerge.sim2 import IDENTITY, Sim2
+from replay.evaluation.placement_error import error_of
+from replay.evaluation.truth import load_truth
 
 _SHORT = {
     Verdict.PLACED: "placed",
@@ -51,7 +53,7 @@ class LastPair:
 def pairs(path: Path) -> Iterator[LastPair]:
     """Yield the pairs of the reference's last map and each other robot's."""
     name = path.name.partition(".")[0]
-    truths = read_truth(path.parent / f"{name}.truth.json")
+    truths = load_truth(path.parent / f"{name}.truth.json").robots
     grids = last_grids(path)
     reference = next(iter(grids))
     for robot, truth in truths.items():
@@ -60,7 +62,7 @@ def pairs(path: Path) -> Iterator[LastPair]:
         cells = MAX_ERROR_CELLS_BENT if name in BENT else MAX_ERROR_CELLS
         allowed = Tolerance(cells * max(grids[reference].resolution_m, grids[robot].resolution_m))
         pose = truth.reference_from_map
-        yield LastPair(path.name, (reference, robot), grids[reference], grids[robot], pose, truth.centre_m, allowed)
+        yield LastPair(path.name, (reference, robot), grids[reference], grids[robot], pose, truth.at_m, allowed)
 
 
 def row(pair: LastPair, method: str) -> tuple[str, ...]:

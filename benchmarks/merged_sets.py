@@ -8,11 +8,12 @@ from time import process_time
 
 from benchmarks.methods import load_method
 from benchmarks.published import MapSet, Names
-from benchmarks.verdicts import Error, Tolerance, Verdict, error_of, verdict
+from benchmarks.verdicts import Tolerance, Verdict, verdict
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.merger import Merger
 from mapmerge.sim2 import Sim2
+from replay.evaluation.placement_error import PlacementError, error_of
 from samples.mission import known_at
 
 
@@ -26,7 +27,7 @@ class PairOutcome:
     source: str
     verdict: Verdict
     reason: str
-    error: Error | None
+    error: PlacementError | None
     confidence: float | None
     seconds: float
 
@@ -58,7 +59,7 @@ class SetOutcome:
     size: int
     together: int
     least: int
-    worst: Error | None
+    worst: PlacementError | None
     is_right: bool
     is_extra: bool
 
@@ -108,18 +109,18 @@ def set_outcome(maps: MapSet, method: str) -> SetOutcome:
         components.setdefault(placement.component, []).append(robot)
     largest = max(components.values(), key=len, default=[])
     truths = all_truths(maps)
-    errors: list[Error] = []
+    errors: list[PlacementError] = []
     for (one, two), truth in truths.items():
         if one in largest and two in largest:
             found = placements[one].component_from_map.inverse() @ placements[two].component_from_map
             errors.append(_error(maps, (one, two), found, truth))
     allowed = Tolerance(maps.max_error_m, maps.max_error_deg)
-    worst = max(errors, key=lambda error: (not error.within(allowed), error.distance_m), default=None)
-    is_right = len(largest) >= maps.least and all(error.within(allowed) for error in errors)
+    worst = max(errors, key=lambda error: (not allowed.admits(error), error.distance_m), default=None)
+    is_right = len(largest) >= maps.least and all(allowed.admits(error) for error in errors)
     return SetOutcome(method, maps.name, len(maps.grids), len(largest), maps.least, worst, is_right, maps.is_extra)
 
 
-def _error(maps: MapSet, pair: Names, found: Sim2, truth: Sim2) -> Error:
+def _error(maps: MapSet, pair: Names, found: Sim2, truth: Sim2) -> PlacementError:
     return error_of(found, truth, overlap_centre_m(maps.grids[pair[0]], maps.grids[pair[1]], truth))
 
 

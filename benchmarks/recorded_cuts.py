@@ -9,9 +9,10 @@ from itertools import permutations
 
 import numpy as np
 
-from benchmarks.data import data_folder, read_truth
+from benchmarks.data import data_folder
 from mapmerge.grid import Grid
 from mapmerge.sim2 import IDENTITY, Points, Sim2
+from replay.evaluation.truth import load_truth
 from replay.feeds import Tally
 from replay.options import RunOptions
 from replay.plan import open_plan
@@ -78,7 +79,7 @@ def recorded(name: str) -> tuple[Maps, dict[str, Sim2]]:
     if folder is None:
         raise FileNotFoundError("the recordings are absent")
     path = folder / "real" / name
-    truths = read_truth(folder / "real" / f"{path.name.partition('.')[0]}.truth.json")
+    truths = load_truth(folder / "real" / f"{path.name.partition('.')[0]}.truth.json").robots
     maps: Maps = {}
     with open_plan(RunOptions(runs=(RunPath(None, path),))) as plan:
         reference = plan.robots[0].robot

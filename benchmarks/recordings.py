@@ -12,11 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.data import Truth, read_truth
-from benchmarks.verdicts import MAX_ERROR_CELLS, MAX_ERROR_CELLS_BENT, Error, Tolerance, error_of
+from benchmarks.verdicts import MAX_ERROR_CELLS, MAX_ERROR_CELLS_BENT, Tolerance
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.sim2 import IDENTITY, Sim2
+from replay.evaluation.placement_error import PlacementError, error_of
+from replay.evaluation.truth import RobotTruth, load_truth
 from replay.events import Merged
 from replay.options import RunOptions
 from replay.pipeline import merge
@@ -58,8 +59,13 @@ class Moment:
 
     time_s: float
     overlap_m2: float
-    error: Error | None
+    error: PlacementError | None
     allowed: Tolerance
+
+    @property
+    def is_right(self) -> bool:
+        """Whether it is placed, and near enough to the truth."""
+        return self.error is not None and self.allowed.admits(self.error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +116,8 @@ class Course:
     def late(self) -> int:
         """At how many moments from the due one on it was not placed rightly."""
         return sum(
-            moment.error is None or not moment.error.within(moment.allowed) for moment in self.moments[self.due :]
+            moment.error is None or not moment.error.within(moment.allowed.distance_m, moment.allowed.angle_deg)
+            for moment in self.moments[self.due :]
         )
 
     @property
@@ -122,7 +129,7 @@ class Course:
 def courses(path: Path, method: str) -> list[Course]:
     """Replay a recording and return how each robot but the reference fared."""
     name = path.name.partition(".")[0]
-    truths = read_truth(path.parent / f"{name}.truth.json")
+    truths = load_truth(path.parent / f"{name}.truth.json").robots
     moments: dict[str, list[Moment]] = {robot: [] for robot in truths}
     last: Merged | None = None
     first_ns: int | None = None
@@ -158,7 +165,7 @@ def _ticks(path: Path, method: str) -> Iterator[Merged]:
 
 
 def _moment(
-    event: Merged, robot: str, truths: Mapping[str, Truth], truth: Truth, time_s: float, recording: str
+    event: Merged, robot: str, truths: Mapping[str, RobotTruth], truth: RobotTruth, time_s: float, recording: str
 ) -> Moment:
     grid = event.result.grids[robot]
     cells = MAX_ERROR_CELLS_BENT if recording in BENT else MAX_ERROR_CELLS
@@ -166,14 +173,14 @@ def _moment(
     allowed = Tolerance(cells * coarsest_m)
     pose = event.result.robots[robot].merged_from_map
     if truth.reference_from_map is None:
-        return Moment(time_s, 0.0, None if pose is None else Error(np.inf, np.inf), allowed)
+        return Moment(time_s, 0.0, None if pose is None else PlacementError(np.inf, np.inf), allowed)
     area_m2, centre_m = _shared_with_others(event.result.grids, robot, grid, truths, truth.reference_from_map)
-    error = None if pose is None else error_of(pose, truth.reference_from_map, centre_m or truth.centre_m)
+    error = None if pose is None else error_of(pose, truth.reference_from_map, centre_m or truth.at_m)
     return Moment(time_s, area_m2, error, allowed)
 
 
 def _shared_with_others(
-    grids: Mapping[str, Grid], robot: str, grid: Grid, truths: Mapping[str, Truth], reference_from_map: Sim2
+    grids: Mapping[str, Grid], robot: str, grid: Grid, truths: Mapping[str, RobotTruth], reference_from_map: Sim2
 ) -> tuple[float, tuple[float, float] | None]:
     """Return the area that a map truly shares with all others of its place together, and its middle."""
     points = grid.centres_m(grid.known)

@@ -11,7 +11,8 @@ import cv2
 from benchmarks.cases import Case
 from benchmarks.methods import load_method
 from benchmarks.recipes import raw_image
-from benchmarks.verdicts import Verdict, error_of, tolerance, verdict
+from benchmarks.verdicts import Verdict, tolerance, verdict
+from replay.evaluation.placement_error import error_of
 from samples.pairs import Pair
 
 
@@ -96,7 +97,7 @@ def judged(pair: Pair, method: str, sift_seconds: float) -> Result:
         verdict=verdict(error, allowed, accepted=placed.accepted, belongs=pair.truth is not None),
         reason=placed.reason,
         is_there=None if found is None else error is not None and not error.is_elsewhere,
-        is_right=None if found is None else error is not None and error.within(allowed),
+        is_right=None if found is None else error is not None and allowed.admits(error),
         error_m=None if error is None else error.distance_m,
         error_deg=None if error is None else error.angle_deg,
         confidence=placed.confidence,

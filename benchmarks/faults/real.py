@@ -6,8 +6,6 @@ What is in them is read by the libraries that are the formats' reference, and wh
 from __future__ import annotations
 
 import hashlib
-import json
-import math
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -15,12 +13,12 @@ from functools import cache
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
 from benchmarks.faults.pieces import alike, shifts
 from mapmerge.grid import Grid
-from mapmerge.sim2 import Sim2, wrap_angle
+from mapmerge.sim2 import Sim2
 from replay.codec import decode
+from replay.evaluation.placement_error import error_of
+from replay.evaluation.truth import load_truth
 from replay.events import Merged
 from replay.sources.base import GRID_TYPE, RawMessage
 
@@ -55,13 +53,8 @@ def raw_messages(path: Path) -> Iterator[RawMessage]:
             yield RawMessage(connection.topic, connection.msgtype, encoding, time_ns, bytes(data))
 
 
-@dataclass(frozen=True, slots=True)
-class _Lies:
-    """Where a robot's map lies: in the frame of the first robot's, and a place within it that is known best."""
-
-    first_from_map: Sim2
-    centre_m: tuple[float, float]
-
+_Lies = tuple[Sim2, tuple[float, float]]
+"""Where a robot's map lies in the frame of the first one's, and a place within it that is known best."""
 
 _Found = tuple[str, Grid, tuple[int, int]]
 
@@ -116,12 +109,12 @@ class Real:
         lies = self._lies()
         if not {target.robot, source.robot} <= set(lies):
             return "though nobody knows what it shows"
-        true = lies[target.robot].first_from_map.inverse() @ lies[source.robot].first_from_map
-        at_m = np.array([lies[source.robot].centre_m])
+        (first_from_target, _), (first_from_source, at_m) = lies[target.robot], lies[source.robot]
         found = target.was_from_is @ target_from_source @ source.was_from_is.inverse()
-        off_m = float(np.hypot(*(found.apply(at_m) - true.apply(at_m))[0]))
-        off_deg = abs(math.degrees(wrap_angle(found.yaw_rad - true.yaw_rad)))
-        return "" if off_m <= MOST_M and off_deg <= MOST_DEG else f"{off_m:.2f} m and {off_deg:.1f}° from where it lies"
+        off = error_of(found, first_from_target.inverse() @ first_from_source, at_m)
+        if off.within(MOST_M, MOST_DEG):
+            return ""
+        return f"{off.distance_m:.2f} m and {off.angle_deg:.1f}° from where it lies"
 
     def _shown(self, name: str, grid: Grid) -> list[_Shown]:
         """Return what a grid shows: told by its cells or, where they are like nobody's, by its name.
@@ -151,16 +144,11 @@ class Real:
 
 @cache
 def _lies(truth: Path) -> Mapping[str, _Lies]:
-    told = json.loads(truth.read_text(encoding="utf-8"))
-    others = {
-        robot: _Lies(Sim2(each["x_m"], each["y_m"], each["yaw_rad"]), tuple(each["overlap_centre_m"]))
-        for robot, each in told["robots"].items()
-        if each["same_place"]
+    return {
+        robot: (item.reference_from_map, item.at_m)
+        for robot, item in load_truth(truth).everybody().items()
+        if item.reference_from_map is not None
     }
-    # of the first one, where the overlap with another one is
-    other = next(iter(others.values()))
-    ((x_m, y_m),) = other.first_from_map.apply(np.array([other.centre_m]))
-    return {told["reference"]: _Lies(Sim2(), (float(x_m), float(y_m))), **others}
 
 
 @cache

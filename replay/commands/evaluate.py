@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,8 +38,8 @@ examples:
   replay evaluate out/floor.json --truth floor.truth.json --max-error-m 0.1 --max-error-deg 1
 
 exit status: 0 evaluated; 1 an error is larger than --max-error-m or --max-error-deg allow, or somebody was merged
-wrongly or missed and either is given; 2 bad usage, or an input that cannot be read; 3 what was found could not be
-written, or a bug; 130 interrupted
+wrongly or missed and either is given: the last lines say who; 2 bad usage, or an input that cannot be read; 3 what
+was found could not be written, or a bug; 130 interrupted
 """
 
 
@@ -65,28 +64,24 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Evaluate, and print what is found."""
-    limits = [_limit(options, "--max-error-m"), _limit(options, "--max-error-deg")]
-
-    from replay.evaluation.errors import pose_errors
+    from replay.evaluation.errors import Limits, pose_errors
     from replay.evaluation.truth import load_truth
     from replay.evaluation.words import json_text, lines
     from replay.report_file import read_report
     from replay.run_result import RunResult
 
+    limits = Limits(_limit(options, "--max-error-m"), _limit(options, "--max-error-deg"))
     result = RunResult.of(read_report(options.file), options.file)
     truth = load_truth(options.truth).seen_from(result.reference, options.truth)
     errors = pose_errors(result, truth)
     of_map = _map_evaluation(options, truth) if options.true_map is not None else None
     with printing():
         if options.json:
-            sys.stdout.write(json_text(errors, of_map))
+            sys.stdout.write(json_text(errors, of_map, limits))
         else:
-            for line in lines(errors, of_map):
+            for line in lines(errors, of_map, limits):
                 print(plain(line))
-    if all(limit is None for limit in limits):
-        return EXIT_DONE
-    most_m, most_deg = (math.inf if limit is None else limit for limit in limits)
-    return EXIT_DONE if errors.within(most_m, most_deg) else EXIT_DIFFERS
+    return EXIT_DIFFERS if limits.are_any and errors.beyond(limits) else EXIT_DONE
 
 
 def _limit(options: argparse.Namespace, flag: str) -> float | None:

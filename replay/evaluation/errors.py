@@ -7,12 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from mapmerge.sim2 import Sim2, wrap_angle
+from replay.evaluation.placement_error import PlacementError, error_of
 from replay.evaluation.truth import RobotTruth, Truth
 from replay.run_result import RobotResult, RunResult
-
-ELSEWHERE_M, ELSEWHERE_DEG = 1.0, 5.0
-"""A placement that is farther off is at another place: no merger would mend it."""
 
 
 class Verdict(StrEnum):
@@ -33,24 +30,50 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class Limits:
+    """How large errors may be; None where that is not limited."""
+
+    distance_m: float | None
+    angle_deg: float | None
+
+    @property
+    def are_any(self) -> bool:
+        """Whether anything is limited."""
+        return self.distance_m is not None or self.angle_deg is not None
+
+
+@dataclass(frozen=True, slots=True)
 class RobotError:
     """How one robot fared.
 
     Parameters
     ----------
-    distance_m
-        How far its map is off amid what it shares with others; None unless it is merged and belongs there.
-    angle_deg
-        By how much it is turned wrongly.
+    error
+        How far its map is off; None unless it is merged and belongs there.
     reason
         What the run says of it.
     """
 
     robot: str
     verdict: Verdict
-    distance_m: float | None
-    angle_deg: float | None
+    error: PlacementError | None
     reason: str
+
+    def beyond(self, limits: Limits) -> str:
+        """Return in words what is more than the limits allow; empty if nothing is.
+
+        Whoever is missed, at another place, or merged though it does not belong, is beyond any.
+        """
+        if self.verdict is Verdict.REFUSED:
+            return ""
+        if self.error is None:
+            return str(self.verdict)
+        off = []
+        if limits.distance_m is not None and self.error.distance_m > limits.distance_m:
+            off.append(f"{self.error.distance_m:.3f} m off, at most {limits.distance_m:g} allowed")
+        if limits.angle_deg is not None and self.error.angle_deg > limits.angle_deg:
+            off.append(f"turned by {self.error.angle_deg:.2f}°, at most {limits.angle_deg:g} allowed")
+        return "; ".join(off) or (str(self.verdict) if self.verdict is Verdict.ELSEWHERE else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,25 +98,17 @@ class PoseErrors:
     @property
     def rmse_m(self) -> float | None:
         """Root mean square of the errors in position, of all that are merged and belong there."""
-        return _rms([item.distance_m for item in self.robots])
+        return _rms([item.error.distance_m for item in self.robots if item.error])
 
     @property
     def rmse_deg(self) -> float | None:
         """The same of the errors in direction."""
-        return _rms([item.angle_deg for item in self.robots])
+        return _rms([item.error.angle_deg for item in self.robots if item.error])
 
-    def within(self, distance_m: float, angle_deg: float) -> bool:
-        """Tell whether all that belong are placed within these errors, and nobody else is."""
-        return all(
-            item.verdict is Verdict.REFUSED
-            or (
-                item.distance_m is not None
-                and item.distance_m <= distance_m
-                and item.angle_deg is not None
-                and item.angle_deg <= angle_deg
-            )
-            for item in self.robots
-        )
+    def beyond(self, limits: Limits) -> dict[str, str]:
+        """Return, of each robot for which that is so, what is more than the limits allow."""
+        said = {item.robot: item.beyond(limits) for item in self.robots}
+        return {robot: what for robot, what in said.items() if what}
 
 
 def pose_errors(result: RunResult, truth: Truth) -> PoseErrors:
@@ -105,25 +120,15 @@ def pose_errors(result: RunResult, truth: Truth) -> PoseErrors:
 
 def _error(name: str, robot: RobotResult | None, truth: RobotTruth) -> RobotError:
     if robot is None:
-        return RobotError(name, Verdict.ABSENT, None, None, "")
+        return RobotError(name, Verdict.ABSENT, None, "")
     true, found = truth.reference_from_map, robot.merged_from_map
     if found is None:
-        verdict = Verdict.REFUSED if true is None else Verdict.MISSED
-    elif true is None:
-        verdict = Verdict.FALSE_MERGE
-    else:
-        distance_m, angle_deg = error_of(found, true, truth.at_m)
-        is_near = distance_m <= ELSEWHERE_M and angle_deg <= ELSEWHERE_DEG
-        return RobotError(name, Verdict.PLACED if is_near else Verdict.ELSEWHERE, distance_m, angle_deg, robot.reason)
-    return RobotError(name, verdict, None, None, robot.reason)
+        return RobotError(name, Verdict.REFUSED if true is None else Verdict.MISSED, None, robot.reason)
+    if true is None:
+        return RobotError(name, Verdict.FALSE_MERGE, None, robot.reason)
+    error = error_of(found, true, truth.at_m)
+    return RobotError(name, Verdict.ELSEWHERE if error.is_elsewhere else Verdict.PLACED, error, robot.reason)
 
 
-def error_of(found: Sim2, true: Sim2, at_m: tuple[float, float]) -> tuple[float, float]:
-    """Return how far a placement is off: in metres at a point of the map's frame, and in degrees."""
-    (x_m, y_m), (true_x_m, true_y_m) = found.apply_point(*at_m), true.apply_point(*at_m)
-    return math.hypot(x_m - true_x_m, y_m - true_y_m), abs(math.degrees(wrap_angle(found.yaw_rad - true.yaw_rad)))
-
-
-def _rms(values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return math.sqrt(sum(value**2 for value in known) / len(known)) if known else None
+def _rms(values: Sequence[float]) -> float | None:
+    return math.sqrt(sum(value**2 for value in values) / len(values)) if values else None

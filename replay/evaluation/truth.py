@@ -47,6 +47,12 @@ class Truth:
     robots: Mapping[str, RobotTruth]
     reference_from_true_map: Sim2 | None
 
+    def everybody(self) -> dict[str, RobotTruth]:
+        """Return what is known of all robots, the reference first, which is compared at what another shares with it."""
+        others = [(item.reference_from_map, item.at_m) for item in self.robots.values()]
+        at_m = next((pose.apply_point(*shared_m) for pose, shared_m in others if pose is not None), (0.0, 0.0))
+        return {self.reference: RobotTruth(IDENTITY, at_m), **self.robots}
+
     def seen_from(self, robot: str, file: Path) -> Truth:
         """Return the same with another robot as the reference.
 
@@ -64,12 +70,11 @@ class Truth:
                 f"--robots {self.reference},… or give a truth that does"
             )
         own_from_reference = known.reference_from_map.inverse()
-        poses = {self.reference: RobotTruth(IDENTITY, (0.0, 0.0)), **self.robots}
         return Truth(
             robot,
             {
                 name: RobotTruth(item.reference_from_map and own_from_reference @ item.reference_from_map, item.at_m)
-                for name, item in poses.items()
+                for name, item in self.everybody().items()
                 if name != robot
             },
             self.reference_from_true_map and own_from_reference @ self.reference_from_true_map,

@@ -10,7 +10,7 @@ from typing import Any
 from mapmerge.likeness import Likeness
 from mapmerge.sim2 import Sim2
 from replay.columns import columns
-from replay.evaluation.errors import PoseErrors, Verdict
+from replay.evaluation.errors import Limits, PoseErrors, Verdict
 from replay.plain_text import plain, plain_json
 
 _DIGITS = 6
@@ -32,12 +32,12 @@ class MapEvaluation:
     tolerance_m: float
 
 
-def lines(errors: PoseErrors, of_map: MapEvaluation | None) -> Iterator[str]:
-    """Yield an evaluation as lines to read."""
+def lines(errors: PoseErrors, of_map: MapEvaluation | None, limits: Limits) -> Iterator[str]:
+    """Yield an evaluation as lines to read; what is beyond the limits comes last."""
     rows = [("robot", "verdict", "position", "turn", "reason")]
     for item in errors.robots:
-        distance = "–" if item.distance_m is None else f"{item.distance_m:.3f} m"
-        turn = "–" if item.angle_deg is None else f"{item.angle_deg:.2f}°"
+        distance = "–" if item.error is None else f"{item.error.distance_m:.3f} m"
+        turn = "–" if item.error is None else f"{item.error.angle_deg:.2f}°"
         rows.append((plain(item.robot), str(item.verdict), distance, turn, item.reason))
     yield from columns(rows, indent="")
     yield from (f"{plain(name)}: there is no truth of it" for name in errors.unknown)
@@ -46,6 +46,8 @@ def lines(errors: PoseErrors, of_map: MapEvaluation | None) -> Iterator[str]:
     yield ", ".join(f"{errors.count(verdict)} {verdict}" for verdict in Verdict if errors.count(verdict))
     if of_map is not None:
         yield from _map_lines(of_map)
+    if limits.are_any:
+        yield from (f"beyond the limits: {plain(robot)}: {what}" for robot, what in errors.beyond(limits).items())
 
 
 def _map_lines(of_map: MapEvaluation) -> Iterator[str]:
@@ -64,14 +66,14 @@ def _map_lines(of_map: MapEvaluation) -> Iterator[str]:
     yield from columns(rows)
 
 
-def json_text(errors: PoseErrors, of_map: MapEvaluation | None) -> str:
+def json_text(errors: PoseErrors, of_map: MapEvaluation | None, limits: Limits) -> str:
     """Return an evaluation as JSON."""
     values: dict[str, Any] = {
         "robots": {
             item.robot: {
                 "verdict": str(item.verdict),
-                "distance_m": item.distance_m,
-                "angle_deg": item.angle_deg,
+                "distance_m": item.error.distance_m if item.error else None,
+                "angle_deg": item.error.angle_deg if item.error else None,
                 "reason": item.reason or None,
             }
             for item in errors.robots
@@ -80,6 +82,7 @@ def json_text(errors: PoseErrors, of_map: MapEvaluation | None) -> str:
         "rmse_m": errors.rmse_m,
         "rmse_deg": errors.rmse_deg,
         "counts": {str(verdict): errors.count(verdict) for verdict in Verdict},
+        "beyond": errors.beyond(limits) if limits.are_any else None,
         "map": None
         if of_map is None
         else {

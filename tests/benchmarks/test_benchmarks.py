@@ -11,10 +11,11 @@ from benchmarks.hough import acceptance_index, hough_spectrum, rotations
 from benchmarks.methods import DEFAULT, RECIPES, load_method, names
 from benchmarks.recordings import Course, Moment
 from benchmarks.reliability import binned, diagram, wilson
-from benchmarks.verdicts import Error, Tolerance, Verdict, error_of, tolerance, verdict
+from benchmarks.verdicts import Tolerance, Verdict, tolerance, verdict
 from mapmerge.grid import Grid
 from mapmerge.match import MATCHERS
 from mapmerge.sim2 import IDENTITY, Sim2
+from replay.evaluation.placement_error import PlacementError, error_of
 from samples.kinds import KINDS
 from tests.floors import flat, in_frame, office_pair
 
@@ -99,12 +100,12 @@ class TestVerdicts:
     @pytest.mark.parametrize(
         ("error", "accepted", "belongs", "expected"),
         [
-            (Error(0.05, 0.2), True, True, Verdict.PLACED),
-            (Error(0.05, 1.5), True, True, Verdict.INEXACT),
-            (Error(0.3, 0.2), True, True, Verdict.INEXACT),
-            (Error(3.0, 0.2), True, True, Verdict.WRONG),
-            (Error(0.05, 90.0), True, True, Verdict.WRONG),
-            (Error(0.05, 0.2), False, True, Verdict.MISSED),
+            (PlacementError(0.05, 0.2), True, True, Verdict.PLACED),
+            (PlacementError(0.05, 1.5), True, True, Verdict.INEXACT),
+            (PlacementError(0.3, 0.2), True, True, Verdict.INEXACT),
+            (PlacementError(3.0, 0.2), True, True, Verdict.WRONG),
+            (PlacementError(0.05, 90.0), True, True, Verdict.WRONG),
+            (PlacementError(0.05, 0.2), False, True, Verdict.MISSED),
             (None, False, True, Verdict.MISSED),
             (None, True, False, Verdict.FALSE_MERGE),
             (None, False, False, Verdict.REFUSED),
@@ -136,19 +137,19 @@ class TestCourses:
         return Course("correlation", "run", "r2", belongs, "accepted", None, moments)
 
     def test_may_be_refused_until_half_of_the_overlap_is_there(self):
-        right = Error(0.01, 0.0)
+        right = PlacementError(0.01, 0.0)
         found = self.course([1.0, 20.0, 50.0, 100.0], [None, None, right, right])
         assert (found.due, found.first, found.late, found.wrong, found.is_right) == (2, 2, 0, 0, True)
         assert not self.course([1.0, 20.0, 50.0, 100.0], [None, None, None, right]).is_right
 
     def test_are_wrong_if_ever_placed_elsewhere(self):
-        right, elsewhere = Error(0.01, 0.0), Error(8.0, 0.0)
+        right, elsewhere = PlacementError(0.01, 0.0), PlacementError(8.0, 0.0)
         found = self.course([1.0, 60.0, 100.0], [elsewhere, right, right])
         assert (found.late, found.wrong, found.is_right) == (0, 1, False)
 
     def test_of_a_stranger_has_no_due_moment(self):
         assert self.course([0.0, 0.0], [None, None], belongs=False).is_right
-        placed = Error(math.inf, math.inf)
+        placed = PlacementError(math.inf, math.inf)
         assert self.course([0.0, 0.0], [placed, None], belongs=False).wrong == 1
 
 

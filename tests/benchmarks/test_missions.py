@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from benchmarks.data import read_truth
 from benchmarks.huge_mission import HugeMission
 from benchmarks.long_mission import MARGIN_CELLS, Mission, main
 from benchmarks.made_once import recorded
-from benchmarks.verdicts import error_of
 from mapmerge.config import MergeConfig
 from replay.codec import decode
+from replay.evaluation.placement_error import error_of
+from replay.evaluation.truth import load_truth
 from replay.events import Merged
 from replay.options import RunOptions
 from replay.pipeline import merge
@@ -43,10 +43,10 @@ class TestAnyMission:
         path = recorded(mission, folder)
         options = RunOptions(runs=(RunPath(None, path),), images="none", merge=MergeConfig())
         last = [event for event in merge(options) if isinstance(event, Merged)][-1]
-        truths = read_truth(path.with_suffix(".truth.json"))
+        truths = load_truth(path.with_suffix(".truth.json")).robots
         assert set(truths) == set(last.result.robots) - {"r1"}
         for robot, truth in truths.items():
-            error = error_of(last.result.robots[robot].merged_from_map, truth.reference_from_map, truth.centre_m)
+            error = error_of(last.result.robots[robot].merged_from_map, truth.reference_from_map, truth.at_m)
             assert error.distance_m < 0.03
             assert error.angle_deg < 0.1
 

@@ -96,6 +96,32 @@ def test_truth_may_be_in_another_robots_frame(replay: Program, outcome: Path) ->
     assert "it says nothing of how r1" in evaluated(replay, outcome, nothing).error
 
 
+def test_what_is_beyond_which_limit_is_said(replay: Program, outcome: Path) -> None:
+    off = of_r2(Sim2(TRUE.x_m + 0.3, TRUE.y_m, TRUE.yaw_rad + math.radians(2.0)), overlap_centre_m=(20.0, 15.0))
+
+    def beyond(*flags: object) -> list[str]:
+        ran = evaluated(replay, outcome, off, *flags)
+        said = [line for line in ran.out.splitlines() if line.startswith("beyond the limits")]
+        assert ran.status == bool(said)
+        return said
+
+    assert beyond() == beyond("--max-error-m", 5) == []
+    (far,) = beyond("--max-error-m", "0.1")
+    assert far.startswith("beyond the limits: r2: ")
+    assert far.endswith(" m off, at most 0.1 allowed")
+    (both,) = beyond("--max-error-m", "0.1", "--max-error-deg", 1)
+    assert " m off, at most 0.1 allowed; turned by " in both
+    (missed,) = evaluated(replay, outcome, of_r2(same_place=False), "--max-error-m", 9).out.splitlines()[-1:]
+    assert missed == "beyond the limits: r2: false merge"
+
+
+def test_another_place_is_beyond_any_limit(replay: Program, outcome: Path) -> None:
+    elsewhere = of_r2(Sim2(TRUE.x_m + 3.0, TRUE.y_m, TRUE.yaw_rad))
+    ran = evaluated(replay, outcome, elsewhere, "--max-error-deg", 5, "--json")
+    assert ran.status == 1
+    assert json.loads(ran.out)["beyond"] == {"r2": "elsewhere"}
+
+
 def test_degrees_are_taken_as_well(replay: Program, outcome: Path) -> None:
     pose = {"x_m": TRUE.x_m, "y_m": TRUE.y_m, "yaw_deg": math.degrees(TRUE.yaw_rad)}
     assert evaluated(replay, outcome, {"reference": "r1", "robots": {"r2": pose}}, "--max-error-deg", 1).status == 0

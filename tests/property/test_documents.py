@@ -21,7 +21,7 @@ from replay.comparison.differences import Tolerance, compare
 from replay.comparison.words import json_text
 from replay.documents import Node
 from replay.errors import InputError
-from replay.evaluation.errors import pose_errors
+from replay.evaluation.errors import Limits, pose_errors
 from replay.evaluation.truth import truth_of
 from replay.evaluation.words import json_text as evaluation_json
 from replay.export.transforms import lines
@@ -94,7 +94,7 @@ def of_expectation(document: Any) -> None:
 
 def of_truth(document: Any) -> None:
     truth = truth_of(Node(FILE, document)).seen_from("r1", FILE)
-    json.loads(evaluation_json(pose_errors(RESULT, truth), None), parse_constant=pytest.fail)
+    json.loads(evaluation_json(pose_errors(RESULT, truth), None, Limits(0.1, 1.0)), parse_constant=pytest.fail)
 
 
 READERS: list[tuple[dict[str, Any], Callable[[Any], None]]] = [
