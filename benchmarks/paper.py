@@ -31,7 +31,8 @@ from benchmarks.paper_cases import (
 from benchmarks.paper_noise import sweep
 from benchmarks.paper_pictures import write_global_map, write_pictures
 from mapmerge.config import MergeConfig, PaperConfig, RansacConfig
-from mapmerge.merger import Merger, MergeResult
+from mapmerge.merger import Merger
+from mapmerge.result import MergeResult
 
 METHODS = ("existing", "paper", "correlation")
 _LITERAL = PaperConfig(turn_tolerance_rad=0.0, max_models=1, ransac=RansacConfig(in_both=False))

@@ -11,9 +11,9 @@ from benchmarks.paper_cases import Case, Outcome
 from mapmerge.config import MergeConfig
 from mapmerge.fuse import fuse
 from mapmerge.grid import Grid
-from mapmerge.merger import MergeResult
 from mapmerge.paper.pixels import class_pixels
 from mapmerge.render import Rgb, render
+from mapmerge.result import MergeResult
 from mapmerge.sim2 import IDENTITY
 from mapmerge.warp import Layer
 

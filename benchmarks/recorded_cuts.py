@@ -14,8 +14,8 @@ from mapmerge.grid import Grid
 from mapmerge.sim2 import IDENTITY, Points, Sim2
 from replay.evaluation.truth import load_truth
 from replay.feeds import Tally
+from replay.open_plan import open_plan
 from replay.options import RunOptions
-from replay.plan import open_plan
 from replay.runs import RunPath
 from replay.timeline import Tick, ticks
 from samples.mission import known_at

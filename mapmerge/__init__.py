@@ -26,11 +26,12 @@ if TYPE_CHECKING:
     from mapmerge.graph import Placement
     from mapmerge.grid import Grid
     from mapmerge.match import Match, Rival
-    from mapmerge.merger import Merger, MergeResult
+    from mapmerge.merger import Merger
     from mapmerge.once import merge
     from mapmerge.outcome import Change, ChangeKind, RobotOutcome, Status
     from mapmerge.prior import Prior
     from mapmerge.reasons import Reason, ReasonCode
+    from mapmerge.result import MergeResult
     from mapmerge.sim2 import Sim2
     from mapmerge.verify import Scores
     from mapmerge.watch import Trigger
@@ -81,7 +82,7 @@ _MODULES = {
     "MapMergeError": "errors",
     "Match": "match",
     "MergeConfig": "config",
-    "MergeResult": "merger",
+    "MergeResult": "result",
     "Merger": "merger",
     "PaperConfig": "config",
     "Placement": "graph",

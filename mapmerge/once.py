@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError, GridError
 from mapmerge.grid import MAX_PERCENT, UNKNOWN, Grid
-from mapmerge.merger import Merger, MergeResult
+from mapmerge.merger import Merger
 from mapmerge.prior import Prior
+from mapmerge.result import MergeResult
 
 GridLike = Grid | NDArray[np.generic]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mapmerge.merger import MergeResult
 from mapmerge.outcome import Change, ChangeKind
+from mapmerge.result import MergeResult
 from mapmerge.sim2 import Sim2
 from replay.words import JUMPED
 

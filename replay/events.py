@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from mapmerge.merger import MergeResult
     from mapmerge.render import Picture
+    from mapmerge.result import MergeResult
 
 SCHEMA = "replay.report/1"
 """The form of reports, of which a program that reads them takes note."""

@@ -40,9 +40,9 @@ def merge_into(
     ReplayError
         If an input cannot be read, or an output not be written.
     """
+    from replay.open_plan import open_plan
     from replay.outputs import refuse_outputs
     from replay.pipeline import drain, events
-    from replay.plan import open_plan
 
     with _own_threads(), open_plan(options) as plan:
         if written is not None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from mapmerge.evidence import Evidence
-from mapmerge.merger import MergeResult
 from mapmerge.outcome import Pair
 from mapmerge.render import Label, Named, render
+from mapmerge.result import MergeResult
 from replay.events import RobotPicture
 from replay.options import ImageChoice
 from replay.palette import robot_colour

@@ -10,9 +10,9 @@ from replay.codec import decode
 from replay.columns import columns
 from replay.errors import BadMessage, ReplayError
 from replay.messages import GridMessage
+from replay.open_plan import open_plan
 from replay.options import RunOptions
 from replay.plain_text import listed, plain
-from replay.plan import open_plan
 from replay.sources import open_sources
 from replay.sources.base import GRID_TYPE, UPDATE_TYPE, Source, SourceInfo
 from replay.sources.losses import Loss

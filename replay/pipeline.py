@@ -21,8 +21,9 @@ from replay.feeds import Tally
 from replay.footprint import enough_memory
 from replay.gallery import Gallery
 from replay.no_map import losses_of, none_used
+from replay.open_plan import memory_limit, open_plan
 from replay.options import OutputOptions, RunOptions
-from replay.plan import Plan, memory_limit, open_plan
+from replay.plan import Plan
 from replay.report import ReportBuilder
 from replay.sinks.base import Sink
 from replay.timeline import Transforms, ticks

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from replay.errors import InputError
+from replay.file_lock import try_lock
 from replay.interrupts import held_off
 from replay.mcap_salvage import Salvage
 from replay.options import OutputOptions
 from replay.outputs import refuse_inputs, refuse_unwritable
 from replay.sinks import all_output_paths, claim, refuse_existing, remove_left_over, reserved_paths
-from replay.sinks.file_lock import try_lock
 from replay.sinks.mcap_copy import McapCopy
 from replay.sinks.partial_file import PartialFile, partial_name, recovering_name
 from replay.sinks.publication import publish

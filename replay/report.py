@@ -14,10 +14,10 @@ from typing import Any
 
 from mapmerge.fuse import Agreement
 from mapmerge.match import Match
-from mapmerge.merger import MergeResult
 from mapmerge.outcome import ChangeKind, Pair
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
+from mapmerge.result import MergeResult
 from mapmerge.sim2 import Sim2, wrap_angle
 from replay.events import SCHEMA, Noted, Report, RobotInput, Skipped
 from replay.sources.losses import Listing

@@ -13,9 +13,10 @@ from typing import Any
 from mapmerge.config import MergeConfig
 from mapmerge.evidence import Evidence
 from mapmerge.grid import Grid
-from mapmerge.merger import Merger, MergeResult
+from mapmerge.merger import Merger
 from mapmerge.outcome import Pair
 from mapmerge.prior import Prior
+from mapmerge.result import MergeResult
 
 _MOST_BYTES = 300 << 20
 # of placements, reasons and the like

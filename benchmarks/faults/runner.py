@@ -22,9 +22,10 @@ from replay import pipeline
 from replay.errors import ReplayError, UsageError
 from replay.events import Merged, Skipped
 from replay.feeds import Feed
+from replay.open_plan import open_plan
 from replay.options import RunOptions
 from replay.plain_text import plain
-from replay.plan import Plan, open_plan
+from replay.plan import Plan
 from replay.runs import RunPath
 from replay.sources.base import RawMessage, Source
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from mapmerge.grid import Grid
-from mapmerge.merger import Merger, MergeResult
+from mapmerge.merger import Merger
+from mapmerge.result import MergeResult
 
 Step = Callable[[Mapping[str, Grid]], MergeResult]
 

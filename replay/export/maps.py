@@ -12,9 +12,9 @@ from mapmerge.grid import Grid
 from replay.errors import InputError, UsageError
 from replay.events import Noted, Skipped
 from replay.feeds import Tally
+from replay.open_plan import open_plan
 from replay.options import RunOptions, TimeBound
 from replay.plain_text import listed, plain
-from replay.plan import open_plan
 from replay.runs import RunPath, TopicChoice
 from replay.sources import open_source
 from replay.sources.base import GRID_TYPE

@@ -8,8 +8,8 @@ from typing import Any
 
 from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
-from mapmerge.merger import MergeResult
 from mapmerge.raster import shrunk
+from mapmerge.result import MergeResult
 from mapmerge.sim2 import Sim2
 from mapmerge.warp import Layer
 from replay.decisions import decisions

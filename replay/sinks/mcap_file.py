@@ -17,7 +17,7 @@ import numpy as np
 from mcap.writer import Writer
 
 from mapmerge.grid import UNKNOWN, Grid
-from mapmerge.merger import MergeResult
+from mapmerge.result import MergeResult
 from replay import __version__
 from replay.codec import (
     IMAGE_TYPE,

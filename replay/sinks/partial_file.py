@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import BinaryIO, Self
 
 from replay.errors import OutputError
+from replay.file_lock import try_lock
 from replay.interrupts import put_off
-from replay.sinks.file_lock import try_lock
 
 # Windows neither renames nor removes a file that is open.
 _CLOSED_FIRST = os.name == "nt"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapmerge.merger import MergeResult
+from mapmerge.result import MergeResult
 from mapmerge.sim2 import Points, Sim2
 from replay.sinks.rerun_labels import PointM, label_places_m
 

@@ -12,9 +12,9 @@ import rerun as rr
 
 from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
-from mapmerge.merger import MergeResult
 from mapmerge.outcome import RobotOutcome, Status
 from mapmerge.resample import in_bands
+from mapmerge.result import MergeResult
 from mapmerge.sim2 import Points, Sim2
 from mapmerge.warp import Bytes
 from replay.sinks.rerun_entities import GROUND, MERGED, MERGED_MAP, EntityPath, RobotEntities

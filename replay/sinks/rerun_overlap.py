@@ -8,8 +8,8 @@ import numpy as np
 import rerun as rr
 
 from mapmerge.config import CellConfig
-from mapmerge.merger import MergeResult
 from mapmerge.overlap import AGREE, CONTRADICT, overlap
+from mapmerge.result import MergeResult
 from mapmerge.warp import Layer
 from replay.sinks.rerun_entities import OVERLAP
 from replay.sinks.rerun_stream import RrdStream

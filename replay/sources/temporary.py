@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from replay.sinks.file_lock import try_lock
+from replay.file_lock import try_lock
 
 _PREFIX = "replay-"
 _LOCK, _COPIES = "lock", "copies"

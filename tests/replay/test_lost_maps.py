@@ -15,8 +15,8 @@ import pytest
 
 from replay.events import Skipped
 from replay.feeds import Tally
+from replay.open_plan import open_plan
 from replay.options import RunOptions
-from replay.plan import open_plan
 from replay.runs import RunPath
 from replay.skip_cause import SkipCause
 from replay.sources import open_source

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from replay.errors import InputError, UsageError
+from replay.open_plan import open_plan
 from replay.options import RunOptions, TimeBound
-from replay.plan import MERGED_FRAME, Plan, open_plan
+from replay.plan import MERGED_FRAME, Plan
 from replay.runs import RunPath
 from replay.sources.base import UPDATE_TYPE
 from tests.bags import SECOND, Recorded, write_mcap, write_rosbag2

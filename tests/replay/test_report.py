@@ -12,10 +12,11 @@ import pytest
 
 from mapmerge.fuse import Agreement
 from mapmerge.grid import Grid
-from mapmerge.merger import Merger, MergeResult
+from mapmerge.merger import Merger
 from mapmerge.outcome import RobotOutcome, Status
 from mapmerge.prior import Prior
 from mapmerge.reasons import Reason, ReasonCode
+from mapmerge.result import MergeResult
 from mapmerge.sim2 import Sim2
 from replay.errors import BadMessage
 from replay.events import Noted, Report, RobotInput, Skipped
