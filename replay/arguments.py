@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from difflib import get_close_matches
 from itertools import groupby
+from textwrap import wrap
 from typing import NoReturn
 
 from replay import __version__
@@ -41,6 +42,14 @@ class _Help(argparse.RawDescriptionHelpFormatter):
             return super()._format_action_invocation(action)
         value = self._format_args(action, self._get_default_metavar_for_optional(action))
         return f"{', '.join(action.option_strings)} {value}"
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        """Return paragraphs that fit the terminal; lines that are indented, as of examples, stay as they are."""
+        lines: list[str] = []
+        for is_prose, group in groupby(text.splitlines(), key=lambda line: line[:1].strip() != ""):
+            together = list(group)
+            lines += wrap(" ".join(together), width, break_on_hyphens=False) if is_prose else together
+        return "".join(f"{indent}{line}\n" for line in lines)
 
 
 class Parser(argparse.ArgumentParser):

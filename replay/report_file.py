@@ -64,9 +64,15 @@ def read_report(path: str | os.PathLike[str], at: TimeBound | None = None) -> Re
     return _parsed(path, content)
 
 
-def absolute(path: Path, at: TimeBound) -> TimeBound:
-    """Return a time of a run as one that does not count from its first map."""
-    return TimeBound(_bound_ns(path, read_report(path), at), relative=False)
+def since_1970(path: Path, report: Report, at: TimeBound) -> TimeBound:
+    """Return a time of a run as one that does not count from its first map.
+
+    Raises
+    ------
+    InputError
+        If the report does not say when that was.
+    """
+    return TimeBound(_bound_ns(path, report, at), relative=False)
 
 
 def holds_mcap(path: Path) -> bool:

@@ -115,7 +115,7 @@ def show_tab(client: ViewerClient, name: str) -> None:
         client.set_blueprint(layout, store_id=found.store_id)
         time.sleep(SETTLE_S)
         return
-    raise LookupError(f"there is no tab {name!r}")
+    raise LookupError(f"there is no tab {name!r}; there are: {', '.join(tabs(client))}")
 
 
 def _contents(parts: dict[str, dict[str, object]]) -> list[str]:
@@ -152,9 +152,11 @@ def main() -> int:
     arguments = parser.parse_args()
     if not arguments.recording.is_file():
         parser.error(f"{arguments.recording}: there is no such file")
-    found = taken(
-        arguments.recording, arguments.picture, arguments.at or [None], arguments.tab or [None], arguments.size
-    )
+    times, names = arguments.at or [None], arguments.tab or [None]
+    try:
+        found = taken(arguments.recording, arguments.picture, times, names, arguments.size)
+    except LookupError as error:
+        parser.error(str(error))
     for complaint in found:
         print(complaint, file=sys.stderr)
     return 1 if found else 0

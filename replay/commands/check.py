@@ -81,8 +81,8 @@ def run(options: argparse.Namespace) -> int:
     inputs.refuse_no_runs(options)
     if (options.expect is None) == (options.write_expect is None):
         raise UsageError("give either --expect EXPECT.yaml or --write-expect EXPECT.yaml")
-    if options.write_expect is not None and (options.junit or options.summary):
-        raise UsageError("--junit and --summary tell what is expected: give them with --expect")
+    if options.write_expect is not None and (options.junit or options.summary or options.json):
+        raise UsageError("--junit, --summary and --json tell what was found: give them with --expect")
     _refuse_useless(options)
     try:
         return _write_expectation(options) if options.write_expect is not None else _check(options)

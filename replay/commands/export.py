@@ -137,7 +137,7 @@ def _transforms(options: argparse.Namespace, at: TimeBound | None) -> int:
 
     if options.output is not None:
         refuse_files([options.output], [options.file], force=options.force)
-    result = _run_result(options.file, at)
+    result = _run_result(options.file, _within(options, at))
     robots = _robots(options.robots, result) if options.robots else tuple(result.robots)
     found = list(lines(result, robots, int(options.ros)))
     if options.output is not None:
@@ -170,11 +170,11 @@ def _maps(options: argparse.Namespace, at: TimeBound | None) -> int:
 def _chosen(options: argparse.Namespace, at: TimeBound | None) -> Maps:
     from replay.export.maps import one_map
     from replay.export.placed import placed_maps
-    from replay.report_file import absolute, holds_report
+    from replay.report_file import holds_report
     from replay.runs import RunPath
 
     is_run = holds_report(options.file)
-    at = absolute(options.file, at) if is_run and at is not None else at
+    at = _within(options, at) if is_run else at
     if options.robots:
         result = _run_result(options.file, at)
         recordings = [RunPath.parse(text) for text in options.maps]
@@ -184,6 +184,21 @@ def _chosen(options: argparse.Namespace, at: TimeBound | None) -> Maps:
     if is_run and options.topic is None:
         _say_who_is_missing(_run_result(options.file, at))
     return one_map(options.file, options.topic, at, _say)
+
+
+def _within(options: argparse.Namespace, at: TimeBound | None) -> TimeBound | None:
+    """Return a time of a run as one since 1970; say so if the run ended before it."""
+    from replay.report_file import holds_mcap, read_report, since_1970
+
+    if at is None or not holds_mcap(options.file):
+        return at
+    report = read_report(options.file)
+    absolute = since_1970(options.file, report, at)
+    if report["stamp_ns"] is not None and absolute.ns > report["stamp_ns"]:
+        from replay.words import moment
+
+        say(f"replay: --at {options.at} is after the run, which ends at {moment(report['stamp_ns'])}: as of its end")
+    return absolute
 
 
 def _say_who_is_missing(result: RunResult) -> None:
@@ -234,9 +249,10 @@ def _tell(found: Maps, paths: Sequence[str], options: argparse.Namespace) -> Non
     from replay.words import moment
 
     when = f", as of {moment(found.stamp_ns)}" if found.stamp_ns else ""
-    for grid in found.grids.values():
+    for name, grid in found.grids.items():
         turn_deg = math.degrees(grid.map_from_grid.yaw_rad)
-        say(f"replay: {grid.cols} × {grid.rows} cells of {grid.resolution_m:g} m{when}")
+        whose = f"{plain(name)}: " if options.robots else ""
+        say(f"replay: {whose}{grid.cols} × {grid.rows} cells of {grid.resolution_m:g} m{when}")
         if not grid.known.any():
             say("replay: nothing is known in it: it is the map of a time when there was none")
         if options.to == "map_server" and abs(turn_deg) > _NO_TURN_DEG:

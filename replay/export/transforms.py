@@ -14,21 +14,30 @@ from replay.run_result import RobotResult, RunResult
 def lines(result: RunResult, robots: Sequence[str], ros: int) -> Iterator[str]:
     """Yield a command for each placed robot, and a comment for each other one.
 
+    Each command goes on until it is stopped, so that several are run beside each other.
+
     Parameters
     ----------
     ros
         1 or 2: of which ROS the command is.
     """
     yield _comment(f"{result.name.name}: '{MERGED_FRAME}' is the map frame of {result.reference}, the reference")
+    together = " &" if sum(_is_transform(result.robots[name].merged_from_map) for name in robots) > 1 else ""
     for name in robots:
-        yield from _robot(result.robots[name], ros)
+        yield from _robot(result.robots[name], ros, together)
+    if together:
+        yield "wait"
 
 
-def _robot(robot: RobotResult, ros: int) -> Iterator[str]:
+def _is_transform(pose: Sim2 | None) -> bool:
+    return pose is not None and pose.scale == 1.0
+
+
+def _robot(robot: RobotResult, ros: int, end: str) -> Iterator[str]:
     pose = robot.merged_from_map
     if pose is None:
         yield _comment(f"{robot.robot} is not placed: {robot.reason}: {robot.message}")
-    elif pose.scale != 1.0:
+    elif not _is_transform(pose):
         yield _comment(
             f"{robot.robot} is placed with a scale of {pose.scale:.6f}, which no transform can say: its map's "
             f"resolution is off by that factor; else {_place(pose)}"
@@ -36,7 +45,7 @@ def _robot(robot: RobotResult, ros: int) -> Iterator[str]:
     else:
         if robot.recorded_frame is not None and robot.recorded_frame != robot.map_frame:
             yield _comment(f"{robot.map_frame} is what {robot.robot} recorded as '{robot.recorded_frame}'")
-        yield _command(pose, robot.map_frame, ros)
+        yield _command(pose, robot.map_frame, ros) + end
 
 
 def _comment(text: str) -> str:

@@ -179,6 +179,10 @@ class Narrator:
         self.say(
             f"{placed} of {counted(len(report['robots']), 'map')} {'is' if placed == 1 else 'are'} in the merged map"
         )
+        if len(report["robots"]) == 1:
+            self.say(
+                "there is one robot's map alone, so that nothing was merged with it; `replay info` lists all topics"
+            )
         for line in what_to_do(report):
             self.say(line)
         spent_s = perf_counter() - self._begin_s

@@ -6,6 +6,7 @@ import json
 import math
 import re
 import shlex
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -199,13 +200,15 @@ def test_transforms_are_commands_for_the_shell(replay: Program, tmp_path: Path) 
     out = replay.merge(mixed)
     ran = replay("export", out.mcap, "--to", "tf")
     assert (ran.status, ran.err) == (0, "")
-    _, *all_lines, unplaced = ran.out.splitlines()
+    _, *all_lines, unplaced, last = ran.out.splitlines()
+    assert last == "wait"
     comments, lines = all_lines[::2], all_lines[1::2]
     assert comments == [f"# {robot}/map is what {robot} recorded as 'map'" for robot in ("r1", "r2")]
     assert unplaced.startswith("# r3 is not placed: ")
-    assert replay("export", out.report_path, "--to", "tf").out.splitlines()[1:] == [*all_lines, unplaced]
+    assert replay("export", out.report_path, "--to", "tf").out.splitlines()[1:] == [*all_lines, unplaced, last]
     for robot, line in zip(("r1", "r2"), lines, strict=True):
-        words = shlex.split(line)
+        *words, beside = shlex.split(line)
+        assert beside == "&"
         assert words[:4] == ["ros2", "run", "tf2_ros", "static_transform_publisher"]
         flags = dict(zip(words[4::2], words[5::2], strict=True))
         pose = out.robots[robot]["merged_from_map"]
@@ -230,6 +233,23 @@ def test_transforms_as_of_a_time(replay: Program, outcome: Path) -> None:
     ran = replay("export", outcome, "--to", "tf", "--at", "1")
     assert "# r2 is not placed" in ran.out
     assert "final report alone" in replay("export", outcome.with_suffix(".json"), "--to", "tf", "--at", "1").error
+
+
+def test_a_script_of_transforms_runs_them_beside_each_other(replay: Program, outcome: Path) -> None:
+    assert replay("export", outcome, "--to", "tf", "-o", "tf.sh").status == 0
+    stand_in = "ros2() { echo began >>began; until [ $(wc -l <began) = 2 ]; do sleep 0.01; done; }\n"
+    script = stand_in + (replay.folder / "tf.sh").read_text(encoding="utf-8")
+    subprocess.run(["bash", "-c", script], cwd=replay.folder, check=True, timeout=60.0)
+    assert (replay.folder / "began").read_text(encoding="utf-8") == "began\n" * 2
+
+
+@pytest.mark.parametrize("target", ["tf", "png"])
+def test_a_time_after_the_run_is_named(replay: Program, outcome: Path, target: str) -> None:
+    ran = replay("export", outcome, "--to", target, "--at", "9999", "-o", "late")
+    assert ran.status == 0
+    assert "--at 9999 is after the run, which ends at " in ran.err
+    in_time = replay("export", outcome, "--to", target, "--at", "1", "-o", "early")
+    assert "is after the run" not in in_time.err
 
 
 def test_a_scale_is_no_transform(replay: Program, outcome: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from replay.colours import are_on
+from replay.commands import COMMANDS
 from replay.sinks.terminal_table import table_text
 from tests.bags import write_mcap
 from tests.data_paths import ROOT
@@ -55,6 +56,20 @@ def test_quiet_does_not_hide_a_status(replay: Program, tmp_path: Path) -> None:
     ran = replay.merge(alone, "-q", "--require-all")
     assert (ran.status, ran.out) == (1, "")
     assert ran.err == "replay: not merged: r3; --require-all makes that a failure\n"
+
+
+def test_one_map_alone_is_said_to_be_merged_with_nothing(replay: Program, run: Path) -> None:
+    said = "there is one robot's map alone: nothing was merged with it"
+    assert said in replay.merge(run, "--robots", "r1").err
+    assert said not in replay.merge(run, "--force").err
+
+
+def test_help_fits_the_terminal(replay: Program, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    for command in COMMANDS:
+        lines = replay(command, "--help").out.splitlines()
+        prose = [line for line in lines if not line.startswith((" ", "usage:"))]
+        assert max(map(len, prose)) <= 60, command
 
 
 def test_recover_can_be_quiet(replay: Program, run: Path, tmp_path: Path) -> None:
