@@ -1,7 +1,7 @@
 """Fits the default method's confidence to observations: ``python -m benchmarks.calibrate OBSERVATIONS.jsonl``.
 
 The observations come from `benchmarks.collect`. What is held out of the fit is what the result is stated on: the share
-of accepted placements that are wrong, with its 95 % bound, and a reliability diagram. With ``--write`` the fitted
+of accepted placements that are wrong, with its 95% bound, and a reliability diagram. With ``--write`` the fitted
 curves replace those of `mapmerge.match.calibration`.
 """
 
@@ -84,7 +84,7 @@ def stated(found: Sequence[Observation], models: Models) -> Stated:
 def statement(found: Sequence[Observation], said: Stated, thresholds: Sequence[float]) -> list[str]:
     """Return what can be said of the placements that a confidence accepts, ambiguous pairs apart."""
     ambiguous = np.array([item.ambiguous for item in found])
-    head = f"  {'least':<7} {'accepted':>8} {'wrong':>5}  {'95 % bound':<10}  {'buildings with a wrong one':<32}"
+    head = f"  {'least':<7} {'accepted':>8} {'wrong':>5}  {'95% bound':<10}  {'buildings with a wrong one':<32}"
     lines = [f"{head}  {'placed rightly by overlap':<42} ambiguous"]
     for least in thresholds:
         taken = (said.sure >= least) & ~ambiguous
@@ -97,7 +97,7 @@ def statement(found: Sequence[Observation], said: Stated, thresholds: Sequence[f
         apart = f"{int((both & ~said.right).sum())} of {int(ambiguous.sum())} wrong"
         bound = f"{_bound(int(wrong.sum()), int(taken.sum())):.4f}"
         places = f"{_buildings(found, wrong)} of {_buildings(found, taken)}"
-        places += f" (95 % bound {_bound(_buildings(found, wrong), _buildings(found, taken)):.3f})"
+        places += f" (95% bound {_bound(_buildings(found, wrong), _buildings(found, taken)):.3f})"
         head = f"  {least:<7g} {int(taken.sum()):>8} {int(wrong.sum()):>5}  {bound:<10}  {places:<32}"
         lines.append(f"{head}  {shares:<42} {apart}")
     return lines

@@ -34,12 +34,12 @@ class Bin:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Wilson's bounds of the share that is right, at 95 %."""
+        """Wilson's bounds of the share that is right, at 95%."""
         return wilson(self.right, self.count)
 
 
 def wilson(right: int, count: int) -> tuple[float, float]:
-    """Return Wilson's bounds of a share, at 95 %."""
+    """Return Wilson's bounds of a share, at 95%."""
     if count == 0:
         return 0.0, 1.0
     share, square = right / count, _Z**2 / count
@@ -63,7 +63,7 @@ def diagram(bins: Sequence[Bin]) -> list[str]:
     """Return the lines of the diagram: a bar is what was observed, ``|`` what was stated."""
     if not any(item.count for item in bins):
         return ["the method states no confidence"]
-    lines = [f"{'stated':<13}{'mean':>6}{'right of':>12}{'observed':>10}  {'95 % bounds':<13}"]
+    lines = [f"{'stated':<13}{'mean':>6}{'right of':>12}{'observed':>10}  {'95% bounds':<13}"]
     for item in bins:
         if not item.count:
             continue

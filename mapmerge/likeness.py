@@ -31,7 +31,7 @@ class Likeness:
         Share of the true wall cells, as far as the map knows their surroundings, that have a wall of the map within the
         tolerance; None if there is none.
     wall_error_m, far_wall_error_m
-        How far the map's wall cells are from the nearest true wall: the median, and what 95 % stay within.
+        How far the map's wall cells are from the nearest true wall: the median, and what 95% stay within.
     cells_alike
         Share of the cells that both call occupied or free and of which both say the same; None if there is none.
     free_iou

@@ -27,7 +27,7 @@ def percent(value: float | None) -> str:
     """Return a probability in percent, rounded down, with as many digits as tell it from 1."""
     if value is None:
         return NO_FIGURE
-    return f"{rounded_down(value * 100.0, 2 if value > 0.9 or value < 0.01 else 0):g} %"
+    return f"{rounded_down(value * 100.0, 2 if value > 0.9 or value < 0.01 else 0):g}%"
 
 
 def degrees(yaw_rad: float, digits: int = 1) -> str:

@@ -32,4 +32,4 @@ class OddCells:
 
 def _share(part: int, whole: int) -> str:
     percent = round(100 * part / whole)
-    return f"{percent} %" if percent else "less than 1 %"
+    return f"{percent}%" if percent else "less than 1%"

@@ -18,7 +18,7 @@ from mapmerge.grid import Grid
 from mapmerge.match.candidates import by_sweep
 
 MOST_OF_A_SECOND_LOOK = 3.0
-TABLE = Table(24, ("pairs", "number", "match", "to one SIFT", "90 % below", "second look"))
+TABLE = Table(24, ("pairs", "number", "match", "to one SIFT", "90% below", "second look"))
 
 
 @dataclass(frozen=True, slots=True)

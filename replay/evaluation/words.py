@@ -59,9 +59,9 @@ def _map_lines(of_map: MapEvaluation) -> Iterator[str]:
     rows = []
     for name, what in _SHARES:
         value = getattr(found, name)
-        rows.append(("–" if value is None else f"{100.0 * value:.1f} %", what.format(tolerance_m=of_map.tolerance_m)))
+        rows.append(("–" if value is None else f"{100.0 * value:.1f}%", what.format(tolerance_m=of_map.tolerance_m)))
     if found.wall_error_m is not None and found.far_wall_error_m is not None:
-        far = f"95 % within {found.far_wall_error_m:.3f} m"
+        far = f"95% within {found.far_wall_error_m:.3f} m"
         rows.append((f"{found.wall_error_m:.3f} m", f"from a wall to the nearest true one: the median; {far}"))
     yield from columns(rows)
 

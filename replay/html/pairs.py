@@ -160,7 +160,7 @@ def _figures(match: Match) -> tuple[Figure, ...]:
             ("overlap", area(scores.overlap_m2)),
             (
                 "walls that agree",
-                f"{rounded_down(scores.wall_agreement * 100, 0):.0f} %, {_metres(scores.matched_wall_m)}",
+                f"{rounded_down(scores.wall_agreement * 100, 0):.0f}%, {_metres(scores.matched_wall_m)}",
             ),
             ("walls in the other's free space", _metres(scores.violated_wall_m)),
             ("score", f"{scores.score_m:.1f}"),
@@ -177,7 +177,7 @@ def _rival_figures(rival: Rival) -> tuple[Figure, ...]:
         figures += [
             ("acceptance", share(fit.acceptance)),
             ("overlap", area(fit.overlap_m2)),
-            ("walls that agree", f"{rounded_down(fit.wall_agreement * 100, 0):.0f} %, {_metres(fit.matched_wall_m)}"),
+            ("walls that agree", f"{rounded_down(fit.wall_agreement * 100, 0):.0f}%, {_metres(fit.matched_wall_m)}"),
             ("walls that contradict it", _metres(fit.contradicted_m)),
         ]
     return (*figures, ("score", f"{rival.score_m:.1f}"))

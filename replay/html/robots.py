@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mapmerge.outcome import Status
-from replay.figures import NO_FIGURE, area, degrees, fixed, init_pose, seconds, share
+from replay.figures import NO_FIGURE, area, degrees, fixed, init_pose, percent, seconds, share
 from replay.html.roster import Member
 from replay.html.story import Story
 from replay.words import STATUS_WORDS
@@ -51,7 +51,7 @@ def rows(story: Story) -> list[Row]:
                 init_pose(robot, pose) if pose is not None and status is Status.MERGED else None,
                 share(values["acceptance"]),
                 area(values["overlap_m2"]),
-                share(values["confidence"], 4),
+                percent(values["confidence"]),
                 NO_FIGURE if first_ns is None else seconds(first_ns - story.first_ns),
                 values["updates"],
                 values["reason"]["message"],

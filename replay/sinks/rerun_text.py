@@ -9,7 +9,7 @@ from typing import Any
 
 from replay.decisions import INFO, WARN, Entry
 from replay.events import Merged, Noted, Report, Skipped
-from replay.figures import NO_FIGURE, area, degrees, fixed, share
+from replay.figures import NO_FIGURE, area, degrees, fixed, percent, share
 from replay.plain_text import plain, plain_json
 from replay.words import lost
 
@@ -76,7 +76,7 @@ def about(report: Report) -> str:
 def _row(robot: str, values: Mapping[str, Any]) -> tuple[str, ...]:
     pose = values["merged_from_map"]
     place = (fixed(pose["x_m"], 2), fixed(pose["y_m"], 2), degrees(pose["yaw_rad"])) if pose else (NO_FIGURE,) * 3
-    agreement = share(values["acceptance"]), area(values["overlap_m2"]), share(values["confidence"], 4)
+    agreement = share(values["acceptance"]), area(values["overlap_m2"]), percent(values["confidence"])
     return (cell(robot), cell(values["status"]), *place, *agreement)
 
 

@@ -13,7 +13,7 @@ from replay.advice import ADVICE
 from replay.colours import are_on
 from replay.decisions import decisions
 from replay.events import Event, Merged, Noted, Report, Skipped, Started
-from replay.figures import share
+from replay.figures import percent
 from replay.options import NS_PER_S
 from replay.plain_text import listed, plain
 from replay.skip_cause import SkipCause
@@ -231,7 +231,7 @@ def told(event: Merged, after: str) -> Iterator[str]:
     yield f"{after}: {came}; {event.done} of {counted(event.total, 'message')} read; {spent_s:.2f} s"
     for pair, trigger in result.searched.items():
         match = result.pairs[pair]
-        sure = "" if match.confidence is None else f" (confidence {share(match.confidence, 4)})"
+        sure = "" if match.confidence is None else f" (confidence {percent(match.confidence)})"
         verdict = "accepted" if match.accepted else "refused"
         yield f"  {pair[1]} on {pair[0]} searched, as {trigger.words}: {verdict}{sure}: {match.reason.message}"
     for remark in event.remarks:

@@ -8,7 +8,7 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 from replay.events import Report
-from replay.figures import area, degrees, fixed, share
+from replay.figures import area, degrees, fixed, percent, share
 from replay.plain_text import plain
 from replay.sinks.terminal import open_console
 
@@ -62,7 +62,7 @@ def _table(report: Report, reasons: Sequence[str]) -> Table:
             *_pose(row["merged_from_map"])[: len(pose)],
             share(row["acceptance"], 3),
             area(row["overlap_m2"]),
-            share(row["confidence"], 4),
+            percent(row["confidence"]),
             *([Text(reason)] if reasons else []),
         )
     return table

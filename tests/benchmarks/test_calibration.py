@@ -332,7 +332,7 @@ class TestCalibration:
         at_90, at_999 = (line.split() for line in statement(found, said, [0.9, 0.999])[1:])
         assert at_90[:3] == ["0.9", "2", "1"]
         assert at_999[:3] == ["0.999", "1", "0"]
-        assert "1 of 2 (95 % bound" in " ".join(at_90)
+        assert "1 of 2 (95% bound" in " ".join(at_90)
         assert "0.3–0.5: 1/3" in " ".join(at_90)
         assert " ".join(at_90).endswith("0 of 1 wrong")
         assert by_group(found, said, 0.9) == [

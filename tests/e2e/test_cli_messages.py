@@ -150,9 +150,9 @@ def test_cells_that_mean_nothing_are_named_once_a_topic(replay: Program, tmp_pat
     run = write_mcap(tmp_path / "run.mcap", [*messages, seen("r1", 6.0, data=few)])
     ran = replay.merge(run, "--strict")
     expected = {
-        ("r2", f"run.mcap: /r2/map at {at(1.0)} ns: 25 %"),
-        ("r1", f"run.mcap: /r1/map_updates at {at(5.0)} ns: 100 %"),
-        ("r1", f"run.mcap: /r1/map at {at(6.0)} ns: less than 1 %"),
+        ("r2", f"run.mcap: /r2/map at {at(1.0)} ns: 25%"),
+        ("r1", f"run.mcap: /r1/map_updates at {at(5.0)} ns: 100%"),
+        ("r1", f"run.mcap: /r1/map at {at(6.0)} ns: less than 1%"),
     }
     words = " of the cells are outside −1 to 100: such cells are taken as unknown"
     assert len(ran.report["notes"]) == len(expected)

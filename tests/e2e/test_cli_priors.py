@@ -393,8 +393,8 @@ class TestConfidence:
         assert ran.report["pairs"][0]["confidence"] == 0.99978
         head, first, second = ran.out.splitlines()
         assert "confidence" in head
-        assert "0.9997 " in second
-        assert "0.9997" not in first
+        assert "99.97%" in second
+        assert "99.97" not in first
 
     def test_has_a_dash_where_it_is_not_known(self, merged: Callable[..., Any], two: Path) -> None:
         ran = merged(two)

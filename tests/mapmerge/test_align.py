@@ -102,7 +102,7 @@ class TestAlign:
 
     @pytest.mark.parametrize("start", off_by(0.3, 1.5)[:4])
     def test_outliers_do_not_pull_it_away(self, start):
-        """30 % of the points stand about half a metre beside a wall, all on the same side."""
+        """30% of the points stand about half a metre beside a wall, all on the same side."""
         target, walls_m = noisy(2)
         rng = np.random.default_rng(7)
         wrong = rng.uniform(size=len(walls_m)) < 0.3

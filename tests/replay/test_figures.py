@@ -24,7 +24,7 @@ def test_an_area_reads_as_in_a_reason() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "expected"), [(0.99962, "99.96 %"), (1.0, "100 %"), (0.92, "92 %"), (0.0065, "0.65 %"), (0.419, "41 %")]
+    ("value", "expected"), [(0.99962, "99.96%"), (1.0, "100%"), (0.92, "92%"), (0.0065, "0.65%"), (0.419, "41%")]
 )
 def test_a_probability_is_rounded_down(value: float, expected: str) -> None:
     assert percent(value) == expected

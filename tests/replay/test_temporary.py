@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from replay.sinks import file_lock
+from replay import file_lock
 from replay.sources import temporary as module
 from replay.sources.temporary import temporary_folder
 from tests.data_paths import ROOT
