@@ -17,8 +17,8 @@ demo: $(VENV)/.runtime ## set up and merge a sample recording
 	mkdir -p out
 	$(BIN)/replay merge samples/two_robots.mcap -o out/two_robots.mcap --report out/two_robots.html --force
 
-test: check ## set up, lint, check types and docs, run the tests
-	$(BIN)/python -m pytest
+test: check ## set up, lint, check types and docs, run the tests, on up to four cores
+	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal
 
 check: $(VENV)/.dev
 	$(BIN)/ruff check .
