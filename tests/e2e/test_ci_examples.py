@@ -134,12 +134,14 @@ def test_a_check_that_does_not_hold_fails_its_step_and_is_still_shown(runner: Ru
     assert "1 of 10 expectations does not hold" in runner.summary.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(("flags", "status"), [("--min-confidence\n0.9\n", 0), ("--robots\nr2,r1\n", 1)])
-def test_a_comparison_of_two_branches(runner: Runner, work: Path, flags: str, status: int) -> None:
+@pytest.mark.parametrize(
+    ("settings", "status"), [("[merge.verify]\nmin_confidence = 0.9\n", 0), ('robots = ["r2", "r1"]\n', 1)]
+)
+def test_a_comparison_of_two_branches(runner: Runner, work: Path, settings: str, status: int) -> None:
     shutil.copytree(work, work.parent / "base")
     shutil.move(work.parent / "base", work / "base")
-    (work / "base/maps/flags.txt").write_text("--robots\nr1,r2\n", encoding="utf-8")
-    (work / "maps/flags.txt").write_text(flags, encoding="utf-8")
+    (work / "base/maps/replay.toml").write_text('robots = ["r1", "r2"]\n', encoding="utf-8")
+    (work / "maps/replay.toml").write_text(settings, encoding="utf-8")
     *_, (script, _) = scripts("replay-compare.yml")
     ran = runner.run(script, work)
     assert ran.returncode == status, ran.stdout + ran.stderr
