@@ -31,9 +31,10 @@ ADVICE: Mapping[ReasonCode, str] = {
         "by, or record longer. If it is another building or floor, the refusal is right."
     ),
     ReasonCode.WALLS_DISAGREE: (
-        "Look at the overlay, where it is red: if a wall is bent or doubled, mend that robot's SLAM, or leave out "
-        "what came after with `--stop`; if cells have another size than the map says, try `--scale free`. If it is "
-        "another place, the refusal is right."
+        "Most often the robots have not been to the same places yet, or it is another building: then the refusal is "
+        "right. If they have, look at the overlay, where it is red: where a wall is bent or doubled, mend that robot's "
+        "SLAM, or leave out what came after with `--stop`; if cells have another size than the map says, try "
+        "`--scale free`."
     ),
     ReasonCode.LOW_ACCEPTANCE: (
         "Look at the overlay, and try the default method, `--method correlation`, which weighs more than this index."
@@ -44,8 +45,9 @@ ADVICE: Mapping[ReasonCode, str] = {
         "something that is there only once."
     ),
     ReasonCode.LOW_CONFIDENCE: (
-        "If you know about where the robot started, say so with `--init-pose` or `--use-tf`; else let the maps share "
-        "more. If it is another place, the refusal is right."
+        "The robots may not have been to the same places yet: let the maps share more. If they do share a place, and "
+        "you know about where the robot started, say so with `--init-pose` or `--use-tf`. If it is another building, "
+        "the refusal is right."
     ),
     ReasonCode.PRIOR_CONTRADICTED: (
         "The pose that was given is wrong, or the map is: the reason may say where the maps do fit. See whether the "

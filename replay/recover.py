@@ -85,6 +85,8 @@ def recover(damaged: Path, output: Path, *, force: bool = False) -> Recovery:
     ReplayError
         If nothing can be recovered, or the new file cannot be written.
     """
+    with translated(damaged):
+        damaged.stat()
     options = OutputOptions(output, force=force)
     is_partial = _recovers_partial(output, damaged)
     own = {partial_name(output)} if is_partial else set[Path]()

@@ -85,6 +85,7 @@ def select(
         candidates = found.get(robot) or _by_component(robot, runs, infos, topics, counts)
         selected.append(_one(robot, candidates, there, found))
     _refuse_shared(selected)
+    _refuse_unused(selected, topics)
     return tuple(selected)
 
 
@@ -222,6 +223,19 @@ def _refuse_shared(selected: Sequence[Selected]) -> None:
                     f"robots {other!r} and {item.robot!r} would both be fed from {item.topic}; "
                     f"give each its own, as --topic {item.robot}=/its/topic"
                 )
+
+
+def _refuse_unused(selected: Sequence[Selected], topics: Sequence[TopicChoice]) -> None:
+    """Refuse a topic that was named without a robot, and would be left out because its robot was given another one."""
+    used = {item.topic for item in selected}
+    said = {choice.robot: choice.topic for choice in topics if choice.robot is not None}
+    for choice in topics:
+        if said and choice.robot is None and "{robot}" not in choice.topic and choice.topic not in used:
+            others = " ".join(f"--topic {robot}={topic}" for robot, topic in said.items())
+            raise UsageError(
+                f"--topic {choice.topic}: it is not used beside {others}; "
+                f"say whose it is, as --topic NAME={choice.topic}"
+            )
 
 
 def _flags(topics: Mapping[str, Iterable[str]]) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, timedelta
 
 from replay.plain_text import listed
+from replay.robot_names import namespace
 
 STATUS_WORDS: Mapping[str, str] = {
     "reference": "reference",
@@ -37,7 +38,8 @@ def intention(robots: Sequence[str], form: str) -> str:
 
 def unused(topics: Sequence[str]) -> str:
     """Return which map topics are left out, and how to use one."""
-    return f"not used: {listed(topics)}; to use one, say whose it is, as --topic r1={topics[0]}"
+    robot = "/".join(namespace(topics[0])) or "other"
+    return f"not used: {listed(topics)}; to use one, say whose it is, as --topic {robot}={topics[0]}"
 
 
 def lost(messages: int | None) -> str:

@@ -109,7 +109,7 @@ class Narrator:
 
     def take(self, event: Event) -> None:
         """Say what is worth a line, and add up the time."""
-        if isinstance(event, Started) and self._announce:
+        if isinstance(event, Started) and (self._announce or len(event.robots) == 1):
             self.say(intention([f"{item.robot} ({item.topic})" for item in event.robots], "merging {} into {}"))
             if self.unused_topics:
                 self.say(unused(self.unused_topics))
@@ -179,8 +179,6 @@ class Narrator:
         self.say(
             f"{placed} of {counted(len(report['robots']), 'map')} {'is' if placed == 1 else 'are'} in the merged map"
         )
-        if len(report["robots"]) == 1:
-            self.say("there is one robot's map alone: nothing was merged with it; `replay info` lists all topics")
         for line in what_to_do(report):
             self.say(line)
         spent_s = perf_counter() - self._begin_s

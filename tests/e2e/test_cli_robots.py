@@ -208,10 +208,22 @@ class TestSeveralRecordings:
 def test_map_topics_that_are_left_out_are_said(replay: Program, tmp_path: Path) -> None:
     messages = in_log_order(growing("r2"), growing("r1", 1.0, topic="/map"))
     run = write_mcap(tmp_path / "run.mcap", messages)
-    said = "not used: /map; to use one, say whose it is, as --topic r1=/map"
+    said = "not used: /map; to use one, say whose it is, as --topic other=/map"
     assert said in replay.merge(run).err
     assert said in replay("info", run).out
-    assert replay.merge(run, "--topic", "r1=/map", "--force").statuses.keys() == {"r1", "r2"}
+    assert replay.merge(run, "--topic", "other=/map", "--force").statuses.keys() == {"other", "r2"}
+
+
+def test_what_is_said_of_a_map_topic_that_is_left_out_brings_its_robot(replay: Program, two: Path) -> None:
+    first = replay.merge(two, "--topic", "/r1/map")
+    assert "not used: /r2/map; to use one, say whose it is, as --topic r2=/r2/map" in first.err
+    both = replay.merge(two, "--topic", "/r1/map", "--topic", "r2=/r2/map", "--force")
+    assert both.statuses == {"r1": "reference", "r2": "merged"}
+
+
+def test_no_map_takes_the_place_of_one_that_was_named(replay: Program, two: Path) -> None:
+    error = replay.merge(two, "--topic", "/r1/map", "--topic", "r1=/r2/map").error
+    assert error.startswith("--topic /r1/map: it is not used beside --topic r1=/r2/map; say whose it is")
 
 
 def test_the_merged_map_of_an_earlier_run_is_no_robot(replay: Program, two: Path, tmp_path: Path) -> None:

@@ -59,9 +59,9 @@ def test_quiet_does_not_hide_a_status(replay: Program, tmp_path: Path) -> None:
 
 
 def test_one_map_alone_is_said_to_be_merged_with_nothing(replay: Program, run: Path) -> None:
-    said = "there is one robot's map alone: nothing was merged with it"
+    said = "there is only one map, r1 (/r1/map): nothing to merge it with"
     assert said in replay.merge(run, "--robots", "r1").err
-    assert said not in replay.merge(run, "--force").err
+    assert "only one map" not in replay.merge(run, "--robots", "r1,r2", "--force").err
 
 
 def test_help_fits_the_terminal(replay: Program, monkeypatch: pytest.MonkeyPatch) -> None:
