@@ -16,8 +16,13 @@ if TYPE_CHECKING:
 MOST_BYTES = 8 << 20
 
 
-def read_yaml(path: Path) -> Node:
+def read_yaml(path: Path, expected: str) -> Node:
     """Return what a YAML file says.
+
+    Parameters
+    ----------
+    expected
+        What it should be, for errors.
 
     Raises
     ------
@@ -28,7 +33,7 @@ def read_yaml(path: Path) -> Node:
 
     from replay.sources.yaml_text import reader
 
-    text = _text(path)
+    text = _text(path, expected)
     try:
         value = reader(path).load(text)
         composed = reader(path).compose(text)
@@ -36,14 +41,19 @@ def read_yaml(path: Path) -> Node:
         line = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
         raise InputError(f"{path}: {line}this is no YAML: {error.problem or error.context}") from error
     except (YAMLError, ValueError) as error:
-        raise InputError(f"{path}: this is no YAML: {' '.join(str(error).split())}") from error
+        raise InputError(f"{path}: this is no YAML: {' '.join(str(error).split())}; expected {expected}") from error
     if value is None:
-        raise InputError(f"{path}: there is nothing in it")
+        raise InputError(f"{path}: there is nothing in it; expected {expected}")
     return Node(path, value, (), dict(_lines(composed, ())))
 
 
-def read_json(path: Path) -> Node:
+def read_json(path: Path, expected: str) -> Node:
     """Return what a JSON file says.
+
+    Parameters
+    ----------
+    expected
+        What it should be, for errors.
 
     Raises
     ------
@@ -51,26 +61,28 @@ def read_json(path: Path) -> Node:
         If it cannot be read or is no JSON.
     """
     try:
-        return Node(path, json.loads(_text(path)))
+        return Node(path, json.loads(_text(path, expected)))
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: this is no JSON: {' '.join(str(error).split())}") from error
+        raise InputError(f"{path}: this is no JSON: {' '.join(str(error).split())}; expected {expected}") from error
 
 
-def _text(path: Path) -> str:
+def _text(path: Path, expected: str) -> str:
     try:
         if path.exists() and not path.is_file():
-            raise InputError(f"{path}: this is no regular file")
+            raise InputError(f"{path}: this is no regular file; expected {expected}")
         content = path.read_bytes() if path.stat().st_size <= MOST_BYTES else None
     except FileNotFoundError as error:
-        raise InputError(f"{path}: it does not exist") from error
+        raise InputError(f"{path}: it does not exist; expected {expected}") from error
     except OSError as error:
         raise InputError(f"{path}: it cannot be read: {error.strerror}") from error
     if content is None:
-        raise InputError(f"{path}: it has more than {MOST_BYTES} bytes, too many for what was expected")
+        raise InputError(f"{path}: it has more than {MOST_BYTES} bytes; expected {expected}")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: this is no text in UTF-8: byte {error.start} is none of it") from error
+        raise InputError(
+            f"{path}: this is no text in UTF-8: byte {error.start} is none of it; expected {expected}"
+        ) from error
 
 
 def _lines(node: YamlNode, keys: Keys) -> Iterator[tuple[Keys, int]]:

@@ -116,6 +116,11 @@ class RunResult:
     inputs: tuple[RunInput, ...]
     stamp_ns: int | None = None
 
+    def is_joined(self, robot: str) -> bool:
+        """Tell whether a robot's map is in the merged one, and not alone there, as is that of any reference."""
+        placed = {name for name, found in self.robots.items() if found.is_placed}
+        return robot in placed and len(placed) > 1
+
     @staticmethod
     def of(report: Report, name: Path) -> RunResult:
         """Read a report.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -200,11 +200,17 @@ def _all_names(runs: Sequence[RunPath], found: Mapping[str, Candidates]) -> list
     return [*given, *sorted(set(found) - set(given))]
 
 
-def _one(robot: str, candidates: Candidates, there: str, names: Collection[str]) -> Selected:
+def _one(robot: str, candidates: Candidates, there: str, found: Mapping[str, Candidates]) -> Selected:
     if not candidates:
-        alike = [name for name in names if name.lower() == robot.lower()] or get_close_matches(robot, names, 1)
+        alike = [name for name in found if name.lower() == robot.lower()] or get_close_matches(robot, found, 1)
         meant = f"did you mean {alike[0]!r}? There are" if alike else "there are"
-        raise UsageError(f"there is no map of robot {robot!r}; {meant}: {there}")
+        if not found:
+            raise UsageError(f"there is no map of robot {robot!r}; there are: {there}")
+        names = listed([f"{name} ({listed(sorted(topics))})" for name, topics in sorted(found.items())])
+        example = next(topic for topics in found.values() for topic in topics)
+        raise UsageError(
+            f"there is no map of robot {robot!r}; {meant} {names}; to say whose map is whose: --topic {robot}={example}"
+        )
     if len(candidates) > 1:
         choices = _flags({robot: candidates})
         raise UsageError(f"robot {robot!r} has {len(candidates)} map topics; choose one of: {choices}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, timedelta
+from typing import Any
 
 from replay.plain_text import listed
 from replay.robot_names import namespace
@@ -26,6 +27,21 @@ _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 def counted(number: int, what: str) -> str:
     """Return a number of things: 1 message, 2 messages."""
     return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def merged_of(robots: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return how many robots' maps are merged, of a report's ``robots``; the reference alone is not."""
+    placed = sum(values["merged_from_map"] is not None for values in robots.values())
+    if len(robots) == 1:
+        return "there is only one map"
+    if placed == len(robots):
+        return "both maps are merged" if placed == 2 else f"all {placed} maps are merged"
+    return f"{placed} of {len(robots)} maps are merged" if placed > 1 else "no maps are merged"
+
+
+def capitalised(words: str) -> str:
+    """Return words as they begin a sentence."""
+    return words[:1].upper() + words[1:]
 
 
 def intention(robots: Sequence[str], form: str) -> str:

@@ -97,7 +97,7 @@ def load_expectation(path: Path) -> Expectation:
     InputError
         Of what is wrong in it, with its line.
     """
-    return expectation_of(read_yaml(path))
+    return expectation_of(read_yaml(path, "EXPECT.yaml, as `replay check --write-expect` writes it"))
 
 
 def expectation_of(node: Node) -> Expectation:

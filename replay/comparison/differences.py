@@ -102,7 +102,13 @@ def compare(before: RunResult, after: RunResult, tolerance: Tolerance) -> Compar
         elif other is None and one is not None:
             found.append(Difference(robot, "vanished", one.status, "–"))
         elif one is not None and other is not None:
-            found.extend(_of_robot(one, other, frame, tolerance))
+            if before.reference == after.reference:
+                places = one.is_placed, other.is_placed
+            else:  # a reference is always placed, which says nothing where another robot is it
+                places = before.is_joined(robot), after.is_joined(robot)
+            found.extend(_of_place(one, other, places))
+            if all(places):
+                found.extend(_of_placed(one, other, frame, tolerance))
     return Comparison(tuple(found), tuple(_notes(before, after, frame)))
 
 
@@ -123,15 +129,20 @@ def _of_run(before: RunResult, after: RunResult) -> Iterator[Difference]:
             yield Difference("", "skipped", str(one), str(other), f"{cause}: {other - one:+d}", {cause: other - one})
 
 
-def _of_robot(one: RobotResult, other: RobotResult, frame: Sim2 | None, tolerance: Tolerance) -> Iterator[Difference]:
-    if one.is_placed != other.is_placed:
-        yield Difference(one.robot, "placed" if other.is_placed else "lost", one.status, other.status, other.message)
-    elif one.status != other.status and not one.is_placed:
-        yield Difference(one.robot, "status", one.status, other.status, other.message)
-    if one.reason != other.reason and not (one.is_placed or other.is_placed):
-        yield Difference(one.robot, "reason", one.reason, other.reason, other.message)
-    if one.is_placed != other.is_placed:
-        return
+def _of_place(one: RobotResult, other: RobotResult, places: tuple[bool, bool]) -> Iterator[Difference]:
+    """Yield whether a robot was placed or lost, or is in another way, or for another reason, not merged."""
+    was_placed, is_placed = places
+    if was_placed != is_placed:
+        yield Difference(one.robot, "placed" if is_placed else "lost", one.status, other.status, other.message)
+    elif not one.is_placed and not other.is_placed:
+        if one.status != other.status:
+            yield Difference(one.robot, "status", one.status, other.status, other.message)
+        if one.reason != other.reason:
+            yield Difference(one.robot, "reason", one.reason, other.reason, other.message)
+
+
+def _of_placed(one: RobotResult, other: RobotResult, frame: Sim2 | None, tolerance: Tolerance) -> Iterator[Difference]:
+    """Yield how the place of a robot that is merged in both runs differs, and how sure it is."""
     if frame is not None and one.merged_from_map is not None and other.merged_from_map is not None:
         yield from _moved(
             one.robot, one.merged_from_map, frame @ other.merged_from_map, _between_m(one, other), tolerance
@@ -165,9 +176,7 @@ def _moved(robot: str, one: Sim2, other: Sim2, at_m: tuple[float, float], tolera
 
 
 def _figures(one: RobotResult, other: RobotResult, tolerance: Tolerance) -> Iterator[Difference]:
-    """Yield the figures that differ; of a refused robot they are those of its best candidate, and say nothing."""
-    if not one.is_placed:
-        return
+    """Yield the figures that differ."""
     for name in ("acceptance", "confidence"):
         yield from _figure(one.robot, name, getattr(one, name), getattr(other, name), tolerance.share, "{:.3f}")
     largest = max(one.overlap_m2 or 0.0, other.overlap_m2 or 0.0)

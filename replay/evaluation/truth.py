@@ -89,7 +89,7 @@ def load_truth(path: Path) -> Truth:
     InputError
         If it is none.
     """
-    return truth_of(read_json(path))
+    return truth_of(read_json(path, "TRUTH.json, as `replay evaluate --help` shows it"))
 
 
 def truth_of(node: Node) -> Truth:

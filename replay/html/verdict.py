@@ -14,7 +14,7 @@ from replay.figures import percent, share
 from replay.html.roster import Member
 from replay.html.story import Story
 from replay.plain_text import brief, listed
-from replay.words import JUMPED, WITHDRAWN, counted
+from replay.words import JUMPED, WITHDRAWN, capitalised, counted, merged_of
 
 Level = Literal["good", "partly", "bad"]
 
@@ -108,10 +108,8 @@ def _sentence(story: Story, placed: int, merged: int) -> str:
     robots = len(story.robots)
     if robots == 1:
         return "There is only one map: nothing to merge it with." if placed else "No map could be used."
-    if placed == robots:
-        return f"All {robots} maps are merged."
     if merged:
-        return f"{placed} of {robots} maps are merged."
+        return f"{capitalised(merged_of(story.report['robots']))}."
     reference = story.member(story.report["reference"])
     if not placed:
         return f"Nothing is merged: the reference {reference.name} has no usable map."

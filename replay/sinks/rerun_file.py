@@ -30,8 +30,7 @@ from replay.sinks.rerun_paths import PathScene
 from replay.sinks.rerun_plots import Plots
 from replay.sinks.rerun_status import Statuses
 from replay.sinks.rerun_stream import APPLICATION, RrdStream
-from replay.sinks.rerun_summary import LEGEND as LEGEND_TEXT
-from replay.sinks.rerun_summary import Said, summary
+from replay.sinks.rerun_summary import Said, legend, summary
 
 _MARKDOWN = rr.MediaType.MARKDOWN
 
@@ -97,7 +96,8 @@ class _Writer:
         self._start_ns: int | None = None
         self._stamp_ns = 0
         self._laid_out = (-1, False)
-        self.stream.log(LEGEND, rr.TextDocument(LEGEND_TEXT, media_type=_MARKDOWN), static=True)
+        self._has_ways = False
+        self._show_legend()
 
     def take(self, event: Event) -> None:
         """Log an event."""
@@ -139,6 +139,9 @@ class _Writer:
         self._maps.show(event.result)
         self._overlap.show(event.result)
         self._paths.show(event.moved, self._maps.shown)
+        if event.moved and not self._has_ways:
+            self._has_ways = True
+            self._show_legend()
         for item in event.pictures:
             self._show_picture(item)
         self._show_candidates(event)
@@ -156,6 +159,10 @@ class _Writer:
             self._say(entry)
         self._show_pages(event.report, is_last=True)
         self.stream.log(ABOUT, rr.TextDocument(text.about(event.report), media_type=_MARKDOWN), static=True)
+
+    def _show_legend(self) -> None:
+        page = rr.TextDocument(legend(has_ways=self._has_ways), media_type=_MARKDOWN)
+        self.stream.log(LEGEND, page, static=True)
 
     def _show_picture(self, item: RobotPicture) -> None:
         steps = self._steps.setdefault(item.robot, [])

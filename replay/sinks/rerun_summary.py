@@ -13,14 +13,14 @@ from replay.events import Report
 from replay.figures import NO_FIGURE, area, percent, share
 from replay.sinks.rerun_entities import RobotEntities
 from replay.sinks.rerun_text import cell, paragraph
-from replay.words import JUMPED, STATUS_WORDS, WITHDRAWN, counted
+from replay.words import JUMPED, STATUS_WORDS, WITHDRAWN, capitalised, counted, merged_of
 
 _MOST_SAID = 8
 _MOST_WRONG = 6
 _EVENTS = {ChangeKind.JUMPED: JUMPED, ChangeKind.WITHDRAWN: WITHDRAWN}
 
-LEGEND = """\
-- **Walls** are in the colour of the robot that mapped them, and **thin lines** show where it drove.
+_LEGEND = """\
+- **Walls** are in the colour of the robot that mapped them{ways}.
 - **Green** is where two maps or more agree, **red** where a wall of one stands in free space of another, and **grey** \
 what one map alone knows.
 """
@@ -39,6 +39,11 @@ class Said:
         return f"+{self.since_s:.1f} s"
 
 
+def legend(*, has_ways: bool) -> str:
+    """Return how to read the map, in Markdown; with ``has_ways``, where robots drove is on it."""
+    return _LEGEND.format(ways=", and **thin lines** show where it drove" if has_ways else "")
+
+
 def summary(report: Report, robots: Sequence[RobotEntities], said: Sequence[Said], *, is_last: bool = False) -> str:
     """Return the page as of now, in Markdown.
 
@@ -55,7 +60,10 @@ def summary(report: Report, robots: Sequence[RobotEntities], said: Sequence[Said
     is_last
         Whether the run has ended: before that, a map that is not merged may be yet.
     """
-    parts = [f"# {_headline(report)}", f"in the map frame of **{cell(robots[0].robot)}**, the reference"]
+    parts = [
+        f"# {capitalised(merged_of(report['robots']))}",
+        f"in the map frame of **{cell(robots[0].robot)}**, the reference",
+    ]
     parts.append(_table(report, robots))
     nothing = (
         "Nothing: no map was refused, nothing was skipped." if is_last else "All maps are, and nothing was skipped."
@@ -64,16 +72,6 @@ def summary(report: Report, robots: Sequence[RobotEntities], said: Sequence[Said
     parts += [f"### {heading}", *_items(_wrong(report, is_last=is_last), nothing)]
     parts += ["### Decisions", *_items(_lately(said), "None yet.")]
     return "\n\n".join(parts) + "\n"
-
-
-def _headline(report: Report) -> str:
-    robots = report["robots"].values()
-    merged = sum(values["merged_from_map"] is not None for values in robots)
-    if merged == len(robots) > 1:
-        return f"All {merged} robots are merged"
-    if len(robots) == 1:
-        return "There is only one robot"
-    return f"{merged} of {len(robots)} robots are merged" if merged > 1 else "No maps are merged"
 
 
 def _table(report: Report, robots: Sequence[RobotEntities]) -> str:
@@ -101,8 +99,7 @@ def _sure(values: Mapping[str, Any]) -> str:
 
 
 def _overlap(values: Mapping[str, Any]) -> str:
-    is_placed = values["merged_from_map"] is not None and values["overlap_m2"] is not None
-    return area(values["overlap_m2"]) if is_placed else NO_FIGURE
+    return NO_FIGURE if values["overlap_m2"] is None else area(values["overlap_m2"])
 
 
 def _wrong(report: Report, *, is_last: bool) -> list[str]:

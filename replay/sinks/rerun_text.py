@@ -11,7 +11,7 @@ from replay.decisions import INFO, WARN, Entry
 from replay.events import Merged, Noted, Report, Skipped
 from replay.figures import NO_FIGURE, area, degrees, fixed, percent, share
 from replay.plain_text import plain, plain_json
-from replay.words import lost
+from replay.words import lost, merged_of
 
 _MARKS = re.compile(r"[\\`*_\[\]<>#]")
 _COLUMNS = ("robot", "status", "x, m", "y, m", "yaw, °", "acceptance", "overlap", "confidence")
@@ -39,7 +39,7 @@ def outcome(report: Report) -> Iterator[Entry]:
     """Say what became of the robots in the end."""
     robots = report["robots"]
     merged = sum(values["merged_from_map"] is not None for values in robots.values())
-    yield (INFO if merged == len(robots) else WARN), f"end: {merged} of {len(robots)} robots are in the merged map"
+    yield (INFO if merged == len(robots) else WARN), f"end: {merged_of(robots)}"
     for robot, values in robots.items():
         if values["merged_from_map"] is None:
             yield WARN, f"{robot} is not merged: {values['reason']['message']}"

@@ -19,7 +19,7 @@ from replay.plain_text import listed, plain
 from replay.skip_cause import SkipCause
 from replay.sources.losses import part_of
 from replay.standard_streams import quiet_stderr
-from replay.words import counted, intention, lost, moment, recovered, unused
+from replay.words import counted, intention, lost, merged_of, moment, recovered, unused
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -175,10 +175,8 @@ class Narrator:
             )
         if late:
             self.say(f"{counted(late, 'message')} too late to be put in order of time: taken in on arrival")
-        placed = sum(row["merged_from_map"] is not None for row in report["robots"].values())
-        self.say(
-            f"{placed} of {counted(len(report['robots']), 'map')} {'is' if placed == 1 else 'are'} in the merged map"
-        )
+        if len(report["robots"]) > 1:
+            self.say(merged_of(report["robots"]))
         for line in what_to_do(report):
             self.say(line)
         spent_s = perf_counter() - self._begin_s

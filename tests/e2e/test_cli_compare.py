@@ -148,6 +148,15 @@ def test_poses_in_another_reference_are_taken_to_the_first_one(replay: Program, 
     assert differences(ran) == [("", "reference")]
 
 
+def test_another_reference_that_nobody_is_merged_with_changes_nobody(replay: Program, tmp_path: Path) -> None:
+    apart = write_mcap(tmp_path / "apart.mcap", [seen("r1", 0.0), seen("r3", 1.0, bare_room())])
+    first = replay("merge", apart, "--robots", "r1,r3", "--no-rrd", "-o", tmp_path / "first.mcap")
+    second = replay("merge", apart, "--robots", "r3,r1", "--no-rrd", "-o", tmp_path / "second.mcap")
+    assert (first.status, second.status) == (0, 0)
+    ran = replay("compare", tmp_path / "first.json", tmp_path / "second.json", "--json")
+    assert differences(ran) == [("", "reference")]
+
+
 def test_poses_without_a_common_robot_are_not_compared(replay: Program, report: dict[str, Any]) -> None:
     def other_reference(other: dict[str, Any]) -> None:
         robots = other["robots"]

@@ -31,7 +31,7 @@ def test_it_is_written_where_it_is_asked_for(replay: Program, two: Path, tmp_pat
     assert names(tmp_path) == ["out.json", "out.mcap", "pages"]
     assert names(tmp_path / "pages") == ["run.html"]
     assert ran.err.rstrip().endswith("wrote out.mcap, pages/run.html, out.json")
-    assert "All 2 maps are merged." in Page.read(tmp_path / "pages/run.html").words()
+    assert "Both maps are merged." in Page.read(tmp_path / "pages/run.html").words()
 
 
 def test_without_it_no_page_is_written(replay: Program, two: Path, tmp_path: Path) -> None:

@@ -74,7 +74,7 @@ def test_every_picture_says_what_it_shows(any_page: Page) -> None:
 @pytest.mark.parametrize(
     ("scenario", "sentence"),
     [
-        ("merged", "All 2 maps are merged."),
+        ("merged", "Both maps are merged."),
         ("three_robots_one_unplaced", "2 of 3 maps are merged."),
         ("nobody_merged", "Nothing is merged: none of the other 2 maps was placed on that of r1."),
         ("restarted", "Nothing is merged: the map of r2 was not placed on that of r1."),

@@ -167,7 +167,12 @@ class TestRefusals:
         with pytest.raises(InputError, match="only updates of parts of maps"):
             topics(info_of("/r1/map_updates", msgtype=UPDATE_TYPE))
 
-    @pytest.mark.parametrize("options", [{"robots": ["r9"]}, {"choices": ("/{robot}/no",)}, {"choices": ("r1=/no",)}])
+    def test_robots_that_are_there_are_named(self) -> None:
+        with pytest.raises(UsageError) as caught:
+            topics(info_of("/r1/map", "/r2/map"), robots=["r9"])
+        assert "there are r1 (/r1/map), r2 (/r2/map); to say whose map is whose: --topic r9=" in str(caught.value)
+
+    @pytest.mark.parametrize("options", [{"choices": ("/{robot}/no",)}, {"choices": ("r1=/no",)}])
     def test_what_is_there_is_listed_as_flags(self, options: dict) -> None:
         with pytest.raises(UsageError) as caught:
             topics(info_of("/r1/map", "/r2/map"), **options)

@@ -293,7 +293,7 @@ def test_decisions_say_what_happened_and_why(recording: Path) -> None:
         (STAMPS[4], "WARN", "the map of r2 jumped in its own frame"),
         (STAMPS[4], "WARN", "r2 is withdrawn: not placed on "),
         (STAMPS[5], "INFO", "r2 placed on r1: "),
-        (STAMPS[5], "WARN", "end: 2 of 4 robots are in the merged map"),
+        (STAMPS[5], "WARN", "end: 2 of 4 maps are merged"),
         (STAMPS[5], "WARN", f"{STRANGER} is not merged: not placed on "),
         (STAMPS[5], "WARN", "r4 is not merged: no map that shows anything yet"),
     ]
