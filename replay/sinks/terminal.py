@@ -248,6 +248,7 @@ def open_console(stream: IO[str], colour: str = "auto") -> Console:
         file=stream,
         width=None if stream.isatty() else _WIDTH_WHERE_NO_TERMINAL,
         highlight=False,
+        emoji=False,
         soft_wrap=False,
         # the library would take what forces colours for a terminal, and show its progress there
         force_terminal=stream.isatty(),
