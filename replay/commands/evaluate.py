@@ -56,7 +56,9 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
         default="0.1",
         help="how far apart a wall and its true place may be (default: %(default)s)",
     )
-    limits = parser.add_argument_group("limits, beyond which the exit status is 1; what is not said is 1 m or 5°")
+    limits = parser.add_argument_group(
+        "limits, beyond which the exit status is 1", "of the two, one that is not given is 1 m, or 5°"
+    )
     limits.add_argument("--max-error-m", metavar="METRES", help="largest error in position")
     limits.add_argument("--max-error-deg", metavar="DEGREES", help="largest error in direction")
     parser.add_argument("--json", action="store_true", help="print what is found as JSON")
