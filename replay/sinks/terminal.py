@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from enum import IntEnum
 from time import perf_counter
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from mapmerge.reasons import ReasonCode
 from replay.advice import ADVICE
-from replay.colours import are_on
+from replay.console import Talk
 from replay.decisions import decisions
 from replay.events import Event, Merged, Noted, Report, Skipped, Started
 from replay.figures import percent
@@ -18,28 +17,15 @@ from replay.options import NS_PER_S
 from replay.plain_text import listed, plain
 from replay.skip_cause import SkipCause
 from replay.sources.losses import part_of
-from replay.standard_streams import quiet_stderr
 from replay.words import counted, intention, lost, merged_of, moment, recovered, unused
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
-_WIDTH_WHERE_NO_TERMINAL = 400
 _SKIPPED_NAMED = 5
 _LONGEST_RUN_S = 1e6
 """Messages farther from the first map than this have a time that is not to be believed."""
-
-
-class Talk(IntEnum):
-    """How much is said."""
-
-    QUIET = 0
-    """Nothing."""
-    USUAL = 1
-    """What is worth a line."""
-    VERBOSE = 2
-    """What was done at each time, as well."""
 
 
 class ProgressSink:
@@ -109,7 +95,7 @@ class Narrator:
 
     def take(self, event: Event) -> None:
         """Say what is worth a line, and add up the time."""
-        if isinstance(event, Started) and (self._announce or len(event.robots) == 1):
+        if isinstance(event, Started) and self._announce:
             self.say(intention([f"{item.robot} ({item.topic})" for item in event.robots], "merging {} into {}"))
             if self.unused_topics:
                 self.say(unused(self.unused_topics))
@@ -177,6 +163,8 @@ class Narrator:
             self.say(f"{counted(late, 'message')} too late to be put in order of time: taken in on arrival")
         if len(report["robots"]) > 1:
             self.say(merged_of(report["robots"]))
+        elif not self._announce:
+            self.say(intention([f"{robot} ({row['map_topic']})" for robot, row in report["robots"].items()], ""))
         for line in what_to_do(report):
             self.say(line)
         spent_s = perf_counter() - self._begin_s
@@ -232,26 +220,3 @@ def told(event: Merged, after: str) -> Iterator[str]:
         yield f"  {pair[1]} on {pair[0]} searched, as {trigger.words}: {verdict}{sure}: {match.reason.message}"
     for remark in event.remarks:
         yield f"  {remark}"
-
-
-def open_notes(colour: str = "auto") -> Console:
-    """Return a console on standard error, which falls silent where that cannot be written."""
-    return open_console(quiet_stderr(), colour)
-
-
-def open_console(stream: IO[str], colour: str = "auto") -> Console:
-    """Return a console; where there is no terminal, lines are not broken at its width."""
-    from rich.console import Console
-
-    on = are_on(stream, colour)
-    return Console(
-        file=stream,
-        width=None if stream.isatty() else _WIDTH_WHERE_NO_TERMINAL,
-        highlight=False,
-        emoji=False,
-        soft_wrap=False,
-        # the library would take what forces colours for a terminal, and show its progress there
-        force_terminal=stream.isatty(),
-        no_color=not on,
-        color_system=("auto" if stream.isatty() else "standard") if on else None,
-    )
