@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from mapmerge.outcome import ChangeKind
+from replay.decisions import linked_otherwise
 from replay.figures import seconds
 from replay.html.axes import Axis
 from replay.html.plots import Mark, time_axis, time_marks
@@ -68,13 +69,14 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """The course of a run; `left_out` decisions in the middle are not listed."""
+    """The course of a run; `left_out` decisions in the middle are not listed, `otherwise` is what they do not say."""
 
     lanes: tuple[Lane, ...]
     times: tuple[Mark, ...]
     first: tuple[Entry, ...]
     last: tuple[Entry, ...]
     left_out: int
+    otherwise: str | None
 
 
 def course(story: Story) -> Course | None:
@@ -89,7 +91,7 @@ def course(story: Story) -> Course | None:
     entries = [_entry(story, decision) for decision in story.decisions]
     first, last = (entries, []) if len(entries) <= MOST_ENTRIES else _ends(entries)
     left_out = story.decisions_left_out + len(entries) - len(first) - len(last)
-    return Course(lanes, time_marks(over), tuple(first), tuple(last), left_out)
+    return Course(lanes, time_marks(over), tuple(first), tuple(last), left_out, linked_otherwise(story.report))
 
 
 def _ends(entries: Sequence[Entry]) -> tuple[list[Entry], list[Entry]]:

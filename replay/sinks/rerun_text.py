@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from replay.decisions import INFO, WARN, Entry
+from replay.decisions import INFO, WARN, Entry, linked_otherwise
 from replay.events import Merged, Noted, Report, Skipped
 from replay.figures import NO_FIGURE, area, degrees, fixed, percent, share
 from replay.plain_text import plain, plain_json
@@ -43,6 +43,8 @@ def outcome(report: Report) -> Iterator[Entry]:
     for robot, values in robots.items():
         if values["merged_from_map"] is None:
             yield WARN, f"{robot} is not merged: {values['reason']['message']}"
+    if (otherwise := linked_otherwise(report)) is not None:
+        yield INFO, f"end: {otherwise}"
 
 
 def robots_table(report: Report) -> str:
