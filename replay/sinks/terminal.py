@@ -139,37 +139,20 @@ class Narrator:
         return f"{event.topic} at {moment(event.log_time_ns)}{since}"
 
     def sum_up(self, report: Report, paths: Sequence[str]) -> None:
-        """Say what was skipped, how long it took, and what was written."""
-        for item in report["inputs"]:
-            early = [each for each in report["skipped_at"] if _ends_early(each) and each["input"] == item["name"]]
-            if early:
-                parts = list(dict.fromkeys(part for each in early if (part := part_of(each["place"]))))
-                self.say(recovered(item["name"], item["messages"], item["until_ns"], parts))
-        if (otherwise := linked_otherwise(report)) is not None:
-            self.say(otherwise)
+        """Say what was skipped, what became of the maps, how long it took, and what was written."""
         beyond = self._skipped - Counter(dict.fromkeys(self._skipped, _SKIPPED_NAMED))
-        for cause, more in beyond.items():
-            self.say(f"and {more} more of {cause}: the report lists them under skipped_at")
-        skipped, late = sum(report["skipped"].values()), sum(item["late"] for item in report["inputs"])
-        if skipped:
-            least = {each["cause"] for each in report["skipped_at"] if each["messages"] is None}
-            causes = ", ".join(f"{_least(cause in least)}{count} {cause}" for cause, count in report["skipped"].items())
-            self.say(f"{_least(bool(least))}{counted(skipped, 'message')} skipped: {causes}")
-        bad_stamps = sum(item["bad_stamps"] for item in report["inputs"])
-        if bad_stamps:
-            self.say(
-                f"{counted(bad_stamps, 'message')} with a time far from those around: taken at the time at which "
-                f"{'it was' if bad_stamps == 1 else 'they were'} recorded"
-            )
-        if late:
-            self.say(f"{counted(late, 'message')} too late to be put in order of time: taken in on arrival")
+        lines = [
+            *ended_early(report),
+            *(f"and {more} more of {cause}: the report lists them under skipped_at" for cause, more in beyond.items()),
+            *not_used(report),
+        ]
         if len(report["robots"]) > 1:
-            self.say(merged_of(report["robots"]))
+            lines += [merged_of(report["robots"]), *filter(None, [linked_otherwise(report)])]
         elif not self._announce:
-            self.say(intention([f"{robot} ({row['map_topic']})" for robot, row in report["robots"].items()], ""))
-        for line in what_to_do(report):
-            self.say(line)
+            lines.append(intention([f"{robot} ({row['map_topic']})" for robot, row in report["robots"].items()], ""))
         spent_s = perf_counter() - self._begin_s
+        for line in (*lines, *what_to_do(report)):
+            self.say(line)
         self.say(
             f"{counted(report['updates'], 'map')} at {counted(self._ticks, 'time')} in {spent_s:.1f} s: "
             f"{self._merge_s:.1f} s merging, {self._render_s:.1f} s drawing; wrote {', '.join(paths) or 'nothing'}"
@@ -198,6 +181,32 @@ def _least(is_least: bool) -> str:
 
 def _ends_early(skipped: Report) -> bool:
     return bool(skipped["cause"] == SkipCause.ENDS_EARLY)
+
+
+def ended_early(report: Report) -> Iterator[str]:
+    """Yield what was read of recordings that end early."""
+    for item in report["inputs"]:
+        early = [each for each in report["skipped_at"] if _ends_early(each) and each["input"] == item["name"]]
+        if early:
+            parts = list(dict.fromkeys(part for each in early if (part := part_of(each["place"]))))
+            yield recovered(item["name"], item["messages"], item["until_ns"], parts)
+
+
+def not_used(report: Report) -> Iterator[str]:
+    """Yield how many messages were skipped, or were taken in at another time than they say."""
+    skipped, late = sum(report["skipped"].values()), sum(item["late"] for item in report["inputs"])
+    if skipped:
+        least = {each["cause"] for each in report["skipped_at"] if each["messages"] is None}
+        causes = ", ".join(f"{_least(cause in least)}{count} {cause}" for cause, count in report["skipped"].items())
+        yield f"{_least(bool(least))}{counted(skipped, 'message')} skipped: {causes}"
+    bad_stamps = sum(item["bad_stamps"] for item in report["inputs"])
+    if bad_stamps:
+        yield (
+            f"{counted(bad_stamps, 'message')} with a time far from those around: taken at the time at which "
+            f"{'it was' if bad_stamps == 1 else 'they were'} recorded"
+        )
+    if late:
+        yield f"{counted(late, 'message')} too late to be put in order of time: taken in on arrival"
 
 
 def what_to_do(report: Report) -> Iterator[str]:
