@@ -6,12 +6,13 @@ values, which stay as they are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
+from mapmerge.checks import shown
 from mapmerge.config import MergeConfig
-from mapmerge.errors import ConfigError
+from mapmerge.errors import ConfigError, GridError
 from mapmerge.evidence import Evidence
 from mapmerge.extents import Extent, first_too_large
 from mapmerge.fuse import Canvas, Fusion
@@ -49,12 +50,13 @@ class Merger:
     Raises
     ------
     ConfigError
-        If there is no robot, or one twice, or no such method.
+        If there is no robot, or one twice, or no such method, or an argument is of another kind.
     """
 
     def __init__(self, robots: Sequence[str], config: MergeConfig | None = None, mapped: Mapped = map) -> None:
-        if not robots or len(set(robots)) != len(robots):
-            raise ConfigError(f"robots are {list(robots)}; expected at least one, each once")
+        _refuse_no_names(robots)
+        if config is not None and not isinstance(config, MergeConfig):
+            raise ConfigError(f"config is {shown(config)}; expected a MergeConfig")
         self._config = config or MergeConfig()
         matcher = load_matcher(self._config.method)
         self._held = HeldMaps(robots, self._config)
@@ -87,12 +89,12 @@ class Merger:
         Raises
         ------
         ConfigError
-            If an update is of a robot that is not among those of the merger.
+            If an update is of a robot that is not among those of the merger, or a belief is none.
+        GridError
+            If an update is no `Grid`.
         """
         robots = tuple(self.result.robots)
-        strangers = sorted(set(updates) - set(robots))
-        if strangers:
-            raise ConfigError(f"there are maps of {', '.join(strangers)}; expected only maps of {', '.join(robots)}")
+        _refuse_others(updates, priors, robots)
         new = self._held.take(updates)
         if not new.updated and not is_last:
             self.result = replace(self.result, updated=(), changes=(), searched={})
@@ -196,6 +198,46 @@ class Merger:
         looked = Looked(searched, jumped, shown_before)
         changes, self._reported = changes_of(outcomes, self._reported, self._held.centres_m, looked, self._config)
         return changes
+
+
+def _refuse_no_names(robots: Sequence[str]) -> None:
+    """Refuse what is no list of names of robots.
+
+    Raises
+    ------
+    ConfigError
+        If it is none.
+    """
+    names = list(robots) if isinstance(robots, Iterable) and not isinstance(robots, (str, bytes)) else None
+    if names is None or not all(isinstance(name, str) for name in names):
+        raise ConfigError(f"robots are {shown(robots)}; expected a list of names, such as ['r1', 'r2']")
+    if not names or len(set(names)) != len(names):
+        raise ConfigError(f"robots are {names}; expected at least one, each once")
+
+
+def _refuse_others(updates: Mapping[str, Grid], priors: Mapping[str, Prior] | None, robots: Sequence[str]) -> None:
+    """Refuse what are no maps of these robots, or no beliefs.
+
+    Raises
+    ------
+    ConfigError
+        If there are maps of others, or beliefs are of another kind.
+    GridError
+        If one is no map.
+    """
+    if not isinstance(updates, Mapping):
+        raise ConfigError(f"maps are {shown(updates)}; expected a mapping of robots to grids")
+    strangers = sorted(str(robot) for robot in updates if robot not in robots)
+    if strangers:
+        raise ConfigError(f"there are maps of {', '.join(strangers)}; expected only maps of {', '.join(robots)}")
+    for robot, grid in updates.items():
+        if not isinstance(grid, Grid):
+            raise GridError(f"the map of {robot} is {shown(grid)}; expected a Grid, such as Grid(cells, resolution_m)")
+    if priors is not None and not isinstance(priors, Mapping):
+        raise ConfigError(f"priors are {shown(priors)}; expected a mapping of robots to Prior values")
+    for robot, prior in (priors or {}).items():
+        if not isinstance(prior, Prior):
+            raise ConfigError(f"the prior of {robot} is {shown(prior)}; expected a Prior")
 
 
 def _placed(centres_m: Mapping[str, tuple[float, float]], pairs: Mapping[Pair, Match], config: MergeConfig) -> Forest:
