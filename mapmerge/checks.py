@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import reprlib
 from numbers import Real
 
@@ -11,6 +12,14 @@ _LONGEST = 60
 def is_number(value: object) -> bool:
     """Tell whether a value is a number, of Python or of another library; True and False are none."""
     return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def is_finite(number: float) -> bool:
+    """Tell whether a number is finite as a `float`."""
+    try:
+        return math.isfinite(number)
+    except OverflowError:
+        return False
 
 
 def shown(value: object) -> str:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from mapmerge.errors import ConfigError
 from mapmerge.match_config import RefineConfig, SearchConfig, SlackConfig
 from mapmerge.paper.config import ExistingConfig, PaperConfig, RansacConfig
-from mapmerge.settings import Settings, Within
+from mapmerge.settings import Above, Settings, Within
 
 __all__ = [
     "CellConfig",
@@ -112,7 +112,7 @@ class VerifyConfig(Settings):
     least_agreement: float = 0.7
     poor_agreement: float = 0.8
     rival_likelihood: float = 0.05
-    min_confidence: Annotated[float, Within(0.0, 1.0)] = 0.92
+    min_confidence: Annotated[float, Above(0.0, 1.0)] = 0.92
     witness_confidence: float = 0.8
     nearly_sure_confidence: float = 0.9
     hopeful_confidence: float = 0.05

@@ -8,7 +8,7 @@ from dataclasses import InitVar, dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmerge.checks import is_number, shown
+from mapmerge.checks import is_finite, is_number, shown
 from mapmerge.errors import GridError
 from mapmerge.sim2 import IDENTITY, Points, Sim2
 
@@ -68,7 +68,7 @@ class Grid:
                 f"cells are {self.cells.dtype} of shape {self.cells.shape}; expected int8 [rows, columns], such as "
                 "cells.astype(np.int8)"
             )
-        if not 0.0 < self.resolution_m < math.inf:
+        if not (is_finite(self.resolution_m) and self.resolution_m > 0.0):
             raise GridError(f"resolution is {shown(self.resolution_m)} m; expected a positive number")
         if max(self.cells.shape) > MAX_SIDE_CELLS:
             rows, cols = self.cells.shape

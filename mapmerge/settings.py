@@ -87,11 +87,11 @@ def _kept(kind: Any, value: Any) -> Any:  # noqa: ANN401 - of any of the fields'
         return value if isinstance(value, str) and value in get_args(base) else None
     if base not in (int, float):
         return value if isinstance(value, base) else None
-    if not is_number(value) or (base is int and not isinstance(value, Integral)) or not limits.holds(value):
+    if not is_number(value) or (base is int and not isinstance(value, Integral)):
         return None
-    if type(value) in (int, float):
-        return value
-    return int(value) if isinstance(value, Integral) else float(value)
+    if type(value) not in (int, float):
+        value = int(value) if isinstance(value, Integral) else float(value)
+    return value if limits.holds(value) else None
 
 
 def _kept_items(kinds: tuple[Any, ...], value: object) -> tuple[Any, ...] | None:

@@ -18,10 +18,9 @@ from mapmerge.errors import ConfigError
 from replay.errors import UsageError
 from replay.footprint import size_to_bytes
 from replay.init_pose import InitPose
-from replay.options import TimeBound, seconds_to_ns
+from replay.options import MOST_NS, NS_PER_S, TimeBound, seconds_to_ns
 from replay.runs import RunPath, TopicChoice
 
-_MOST_S = 1e12
 _MOST_JOBS = 999
 _POSE = "x_m, y_m and yaw_rad, and the standard deviation of each, if any"
 
@@ -80,7 +79,7 @@ def time_bound(name: str, time: object) -> TimeBound | None:
 
 def nanoseconds(name: str, seconds: object) -> int:
     """Read a number of seconds, not negative."""
-    if not _is_number(seconds) or not 0.0 <= seconds <= _MOST_S:
+    if not _is_number(seconds) or not 0.0 <= seconds <= MOST_NS // NS_PER_S:
         raise UsageError(f"{name} is {_shown(seconds)}, which is no number of seconds; expected one such as 12.5")
     number = seconds if _is_whole(seconds) else float(seconds)
     return seconds_to_ns(f"{Decimal(str(number)):f}")

@@ -90,7 +90,8 @@ class TestNumbers:
         assert "\n" not in str(refused.value)
 
     def test_numbers_of_numpy_and_lists_become_those_of_python(self):
-        config = SearchConfig(weighed=np.int64(4), cell_m=np.float32(0.5), free_weights=[np.float64(0.5), 1])
+        weights = [np.float64(0.5), np.int8(1)]
+        config = SearchConfig(weighed=np.int64(4), cell_m=np.float16(0.5), free_weights=weights)
         assert config == SearchConfig(weighed=4, cell_m=0.5, free_weights=(0.5, 1))
         assert {type(each) for each in (config.weighed, config.cell_m, *config.free_weights)} == {int, float}
         assert json.loads(json.dumps(asdict(config)))["weighed"] == 4
@@ -101,7 +102,7 @@ class TestNumbers:
         with pytest.raises(ConfigError, match="reject_m"):
             RefineConfig(reject_m=reject_m)
 
-    @pytest.mark.parametrize("value", [1.001, 99.9])
+    @pytest.mark.parametrize("value", [0, 0.0, 1.001, 99.9])
     def test_a_confidence_is_a_probability(self, value):
         with pytest.raises(ConfigError, match="min_confidence"):
             VerifyConfig(min_confidence=value)
@@ -114,7 +115,7 @@ class TestNumbers:
                 MergeConfig(**config)
 
     def test_zero_is_a_fine_threshold(self):
-        assert VerifyConfig(min_overlap_m2=0.0, min_matched_wall_m=0, min_confidence=0.0).min_confidence == 0.0
+        assert VerifyConfig(min_overlap_m2=0.0, min_matched_wall_m=0).min_overlap_m2 == 0.0
         assert SearchConfig(free_weights=(0.0, 1.0), working_cell_m=0.0).free_weights == (0.0, 1.0)
 
     @pytest.mark.parametrize("value", [(-0.5, 1.0), (math.nan,), (1.0, math.inf)])

@@ -146,6 +146,8 @@ def test_keywords_are_called_as_settings() -> None:
         ({"stop": "noon"}, "is no time"),
         ({"init_poses": {"r2": (1, 2)}}, "init_poses of r2 has 2 numbers; expected x_m, y_m and yaw_rad"),
         ({"min_confidence": 2.0}, "min_confidence is 2.0"),
+        ({"min_confidence": 0}, "min_confidence is 0.0; expected a number more than 0, at most 1"),
+        ({"start": "1" * 5000 + "ns"}, "start: '1111.*… is no time; expected seconds"),
         ({"max_memory": "much"}, "max_memory: 'much' is no size"),
         ({"max_memory": -5}, "max_memory is -5; expected a number of bytes"),
         ({"max_memory": 0}, "max_memory: '0' is less than 1 MiB"),

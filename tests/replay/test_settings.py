@@ -22,8 +22,10 @@ from replay.options import OutputOptions, RunOptions, TimeBound
 from replay.runs import RunPath, TopicChoice
 from replay.settings import fields as merge_fields
 from replay.settings import keys
+from replay.settings.choice import chosen_by
 from replay.settings.documents import read_assignment, read_settings
 from replay.settings.of_run import document_of
+from replay.settings.show import as_toml, shown_settings
 
 TAKING = [name for name in COMMANDS if command_parser(name).takes_settings]
 ALL = keys.known_keys(keys.all_settings())
@@ -221,6 +223,24 @@ def test_toml_that_cannot_be_read_is_refused(tmp_path: Path, text: str) -> None:
 def test_a_number_that_is_too_large_is_none() -> None:
     with pytest.raises(UsageError, match="expected a number"):
         merge_fields.read("merge.verify.min_overlap_m2", 10**400, "x")
+
+
+@pytest.mark.parametrize("value", ["1e300000", "1e999999999", "-1e999999999", "1e-999999999", "9" * 4000])
+@pytest.mark.parametrize(
+    "key", ["time.start", "time.reorder_window_s", "outputs.every_s", "rules.max_memory", "rules.jobs"]
+)
+def test_a_number_of_very_many_digits_is_not_written_out(key: str, value: str) -> None:
+    parser = command_parser("config")
+    chosen = chosen_by(parser, {"set": [f"{key}={value}"]})
+    (text,) = (value for name, value in chosen.items() if name not in ("merge_fields", "origins"))
+    assert len(str(text)) <= 4000
+    options = argparse.Namespace(**{**vars(parser.parse_args([])), **chosen})
+    assert as_toml([item for item in shown_settings(parser, options, MergeConfig()) if item.is_changed])
+
+
+def test_quotes_of_a_text_are_its_own() -> None:
+    chosen = chosen_by(command_parser("merge"), {"set": ["outputs.report='\"a\".html'", "rules.max_memory='\"'"]})
+    assert (str(chosen["report"]), chosen["max_memory"]) == ('"a".html', '"')
 
 
 def test_what_adds_to_lists_is_named_for_several() -> None:
