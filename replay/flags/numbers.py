@@ -22,5 +22,5 @@ def at_least_0(flag: str, text: str) -> float:
     except ValueError:
         number = math.nan
     if not 0.0 <= number <= MOST:
-        raise UsageError(f"{flag} {brief(text)}: expected a number, 0 or more")
+        raise UsageError(f"{flag} {brief(text)}: expected a number from 0 to {MOST:g}")
     return number

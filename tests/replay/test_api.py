@@ -185,6 +185,13 @@ def test_keywords_are_called_as_settings() -> None:
         ({"config": {"method": "paper"}}, "config is .*; expected a MergeConfig"),
         ({"strict": "no"}, "strict is 'no'; expected True or False"),
         ({"use_tf": 1}, "use_tf is 1"),
+        ({"robot": ["r1"]}, "^merge has no keyword robot; did you mean robots\\?$"),
+        ({"init_pose": {}}, "^merge has no keyword init_pose; did you mean init_poses\\?$"),
+        (
+            {"min_overlap_m2": 3},
+            "no keyword min_overlap_m2; it is config.verify.min_overlap_m2, of a",
+        ),
+        ({"x" * 9999: 3}, "^merge has no keyword x{99}…; expected runs, robots, topics, "),
     ],
 )
 def test_what_does_not_fit_is_refused_at_once(told: dict[str, object], said: str) -> None:
@@ -207,6 +214,7 @@ def test_what_is_no_recording_is_refused(runs: object) -> None:
         ({"every_s": -1}, "every_s is -1"),
         ({"rrd": "no"}, "rrd is 'no'; expected True or False"),
         ({"force": None}, "force is None"),
+        ({"copy_map": True}, "^write has no keyword copy_map; did you mean copy_maps\\?$"),
     ],
 )
 def test_what_cannot_be_written_is_refused(tmp_path: Path, told: dict[str, object], said: str) -> None:
