@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 from mapmerge.errors import ConfigError
 from mapmerge.match_config import RefineConfig, SearchConfig, SlackConfig
 from mapmerge.paper.config import ExistingConfig, PaperConfig, RansacConfig
-from mapmerge.settings import Settings
+from mapmerge.settings import Above, Settings, Within
 
 __all__ = [
     "CellConfig",
@@ -102,8 +102,8 @@ class VerifyConfig(Settings):
         Placements that differ by more than one of these are rivals, not the same.
     """
 
-    tolerance_m: float = 0.15
-    near_m: float = 0.5
+    tolerance_m: Annotated[float, Within(0.0, 20.0)] = 0.15
+    near_m: Annotated[float, Within(0.0, 20.0)] = 0.5
     violation_weight: float = 2.5
     free_weight: float = 0.15
     min_overlap_m2: float = 6.0
@@ -112,17 +112,12 @@ class VerifyConfig(Settings):
     least_agreement: float = 0.7
     poor_agreement: float = 0.8
     rival_likelihood: float = 0.05
-    min_confidence: float = 0.92
+    min_confidence: Annotated[float, Above(0.0, 1.0)] = 0.92
     witness_confidence: float = 0.8
     nearly_sure_confidence: float = 0.9
     hopeful_confidence: float = 0.05
     distinct_m: float = 0.75
     distinct_rad: float = math.radians(5.0)
-
-    def __post_init__(self) -> None:
-        super(VerifyConfig, self).__post_init__()
-        if self.min_confidence > 1.0:
-            raise ConfigError(f"min_confidence is {self.min_confidence}; expected a probability, at most 1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +187,7 @@ class MergeConfig(Settings):
 
     method: str = "correlation"
     scale: ScaleChoice = "metadata"
-    scale_range: tuple[float, float] = (0.4, 2.5)
+    scale_range: tuple[Annotated[float, Within(0.01, 100.0)], Annotated[float, Within(0.01, 100.0)]] = (0.4, 2.5)
     cells: CellConfig = field(default_factory=CellConfig)
     search: SearchConfig = field(default_factory=SearchConfig)
     refine: RefineConfig = field(default_factory=RefineConfig)

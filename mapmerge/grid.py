@@ -8,6 +8,7 @@ from dataclasses import InitVar, dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from mapmerge.checks import is_finite, is_number, shown
 from mapmerge.errors import GridError
 from mapmerge.sim2 import IDENTITY, Points, Sim2
 
@@ -52,7 +53,7 @@ class Grid:
     Raises
     ------
     GridError
-        If the shape, a cell's value, the resolution or the origin is not that of a map.
+        If the shape, a cell's value, the resolution or the origin is not that of a map, or no value of its kind.
     """
 
     cells: Cells
@@ -61,23 +62,20 @@ class Grid:
     is_own: InitVar[bool] = False
 
     def __post_init__(self, is_own: bool) -> None:
+        self._check_kinds()
         if self.cells.ndim != 2 or self.cells.dtype != np.int8:
             raise GridError(
                 f"cells are {self.cells.dtype} of shape {self.cells.shape}; expected int8 [rows, columns], such as "
                 "cells.astype(np.int8)"
             )
-        if not (math.isfinite(self.resolution_m) and self.resolution_m > 0.0):
-            raise GridError(f"resolution is {self.resolution_m} m; expected a positive number")
+        if not (is_finite(self.resolution_m) and self.resolution_m > 0.0):
+            raise GridError(f"resolution is {shown(self.resolution_m)} m; expected a positive number")
         if max(self.cells.shape) > MAX_SIDE_CELLS:
             rows, cols = self.cells.shape
             raise GridError(f"the grid has {cols} × {rows} cells; a side of at most {MAX_SIDE_CELLS} is expected")
         if self.cells.size and not is_own:
             self._check_values()
-        pose = self.map_from_grid
-        if not all(map(math.isfinite, (pose.x_m, pose.y_m, pose.yaw_rad))):
-            raise GridError(f"the origin is ({pose.x_m}, {pose.y_m}, {pose.yaw_rad}); finite numbers are expected")
-        if pose.scale != 1.0:
-            raise GridError(f"the origin has scale {pose.scale}; a rigid pose is expected")
+        self._check_pose()
         if self.cells.flags.writeable:
             cells = self.cells.view() if is_own else self.cells.copy()
             cells.flags.writeable = False
@@ -87,10 +85,25 @@ class Grid:
         """Return its size and place; the cells would fill the screen."""
         return f"<Grid of {self.cols} × {self.rows} cells of {self.resolution_m:g} m, corner at {self.map_from_grid}>"
 
+    def _check_kinds(self) -> None:
+        if not isinstance(self.cells, np.ndarray):
+            raise GridError(f"cells are {shown(self.cells)}; expected an array of int8 [rows, columns]")
+        if not is_number(self.resolution_m):
+            raise GridError(f"resolution is {shown(self.resolution_m)}; expected a number of metres")
+
     def _check_values(self) -> None:
         low, high = self.cells.min(), self.cells.max()
         if low < UNKNOWN or high > MAX_PERCENT:
             raise GridError(f"cells are between {low} and {high}; expected {UNKNOWN} (unknown) or 0 to {MAX_PERCENT}")
+
+    def _check_pose(self) -> None:
+        pose = self.map_from_grid
+        if not isinstance(pose, Sim2):
+            raise GridError(f"the origin is {shown(pose)}; expected Sim2(x_m, y_m, yaw_rad)")
+        if not all(map(math.isfinite, (pose.x_m, pose.y_m, pose.yaw_rad))):
+            raise GridError(f"the origin is ({pose.x_m}, {pose.y_m}, {pose.yaw_rad}); finite numbers are expected")
+        if pose.scale != 1.0:
+            raise GridError(f"the origin has scale {pose.scale}; a rigid pose is expected")
 
     @property
     def rows(self) -> int:

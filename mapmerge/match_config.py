@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
-from mapmerge.errors import ConfigError
-from mapmerge.settings import Settings
+from mapmerge.settings import Above, Settings, Within
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,35 +53,30 @@ class SearchConfig(Settings):
         Two maps are matched at the coarser of their resolutions, and never finer than this.
     """
 
-    wall_spacing_m: float = 0.10
-    angle_step_rad: float = math.radians(1.0)
-    rotations: tuple[int, int] = (4, 3)
-    cell_m: float = 0.20
-    large_cell_m: float = 0.30
+    wall_spacing_m: Annotated[float, Above(0.0, 10.0)] = 0.10
+    angle_step_rad: Annotated[float, Within(0.001, 0.5)] = math.radians(1.0)
+    rotations: tuple[Annotated[int, Within(0, 1000)], Annotated[int, Within(0, 1000)]] = (4, 3)
+    cell_m: Annotated[float, Above(0.0, 10.0)] = 0.20
+    large_cell_m: Annotated[float, Within(0.0, 10.0)] = 0.30
     free_weights: tuple[float, ...] = (0.5, 1.8)
-    shifts: int = 8
-    peak_distance_m: float = 0.8
-    many_side_cells: int = 640
-    max_side_cells: int = 1000
-    max_candidates: int = 40
-    sweep_step_rad: float = math.radians(2.5)
-    sweep_cell_m: float = 0.25
+    shifts: Annotated[int, Within(0, 1_000)] = 8
+    peak_distance_m: Annotated[float, Within(0.0, 100.0)] = 0.8
+    many_side_cells: Annotated[int, Within(1, 4_000)] = 640
+    max_side_cells: Annotated[int, Within(1, 4_000)] = 1000
+    max_candidates: Annotated[int, Within(0, 10_000)] = 40
+    sweep_step_rad: Annotated[float, Within(0.005, 0.5)] = math.radians(2.5)
+    sweep_cell_m: Annotated[float, Above(0.0, 10.0)] = 0.25
     sweep_free_weights: tuple[float, ...] = (1.5,)
-    sweep_shifts: int = 6
-    sweep_candidates: int = 240
-    scale_step: float = 1.05
-    distinct_scale: float = 0.15
+    sweep_shifts: Annotated[int, Within(0, 1_000)] = 6
+    sweep_candidates: Annotated[int, Within(0, 10_000)] = 240
+    scale_step: Annotated[float, Within(1.005, 10.0)] = 1.05
+    distinct_scale: Annotated[float, Within(0.001, 10.0)] = 0.15
     clear_agreement: float = 0.9
     clear_wall_m: float = 10.0
     clear_likeness: float = 0.5
-    weighed: int = 8
+    weighed: Annotated[int, Within(1, 1_000)] = 8
     worth_weighing: float = 0.15
-    working_cell_m: float = 0.05
-
-    def __post_init__(self) -> None:
-        super(SearchConfig, self).__post_init__()
-        if not self.scale_step > 1.0:
-            raise ConfigError(f"scale_step is {self.scale_step}; expected more than 1")
+    working_cell_m: Annotated[float, Within(0.0, 10.0)] = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,16 +102,16 @@ class RefineConfig(Settings):
         Standard deviation, in cells, by which walls are blurred there.
     """
 
-    rough_reject_m: tuple[float, ...] = (1.0, 0.8, 0.8, 0.5, 0.5, 0.5, 0.3, 0.3)
-    reject_m: tuple[float, ...] = (0.4, 0.3, 0.2, 0.2, 0.15, 0.15)
-    rough_points: int = 300
-    points: int = 1000
-    rough_probes: int = 400
-    probes: int = 2000
-    survivors: int = 16
-    iterations: int = 12
-    max_polish_points: int = 1500
-    blur_cells: float = 1.0
+    rough_reject_m: tuple[Annotated[float, Within(0.001, 20.0)], ...] = (1.0, 0.8, 0.8, 0.5, 0.5, 0.5, 0.3, 0.3)
+    reject_m: tuple[Annotated[float, Within(0.001, 20.0)], ...] = (0.4, 0.3, 0.2, 0.2, 0.15, 0.15)
+    rough_points: Annotated[int, Within(1, 100_000)] = 300
+    points: Annotated[int, Within(1, 100_000)] = 1000
+    rough_probes: Annotated[int, Within(1, 100_000)] = 400
+    probes: Annotated[int, Within(1, 100_000)] = 2000
+    survivors: Annotated[int, Within(0, 10_000)] = 16
+    iterations: Annotated[int, Within(0, 1_000)] = 12
+    max_polish_points: Annotated[int, Within(1, 100_000)] = 1500
+    blur_cells: Annotated[float, Within(0.1, 10.0)] = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,8 +132,8 @@ class SlackConfig(Settings):
         How much wall it takes to shift its surroundings, in each step, by half of what it asks for.
     """
 
-    cell_m: float = 0.5
-    length_m: float = 1.5
-    most_m: float = 0.9
-    reject_m: tuple[float, ...] = (0.9, 0.9, 0.7, 0.5, 0.4, 0.3)
-    stiffness_m: float = 3.0
+    cell_m: Annotated[float, Within(0.05, 100.0)] = 0.5
+    length_m: Annotated[float, Above(0.0, 20.0)] = 1.5
+    most_m: Annotated[float, Within(0.0, 20.0)] = 0.9
+    reject_m: tuple[Annotated[float, Within(0.001, 20.0)], ...] = (0.9, 0.9, 0.7, 0.5, 0.4, 0.3)
+    stiffness_m: Annotated[float, Above(0.0, 1000.0)] = 3.0

@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
+from mapmerge.arguments import refuse_no_names, refuse_others
+from mapmerge.checks import shown
 from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError
 from mapmerge.evidence import Evidence
@@ -49,12 +51,13 @@ class Merger:
     Raises
     ------
     ConfigError
-        If there is no robot, or one twice, or no such method.
+        If there is no robot, or one twice, or no such method, or an argument is of another kind.
     """
 
     def __init__(self, robots: Sequence[str], config: MergeConfig | None = None, mapped: Mapped = map) -> None:
-        if not robots or len(set(robots)) != len(robots):
-            raise ConfigError(f"robots are {list(robots)}; expected at least one, each once")
+        refuse_no_names(robots)
+        if config is not None and not isinstance(config, MergeConfig):
+            raise ConfigError(f"config is {shown(config)}; expected a MergeConfig")
         self._config = config or MergeConfig()
         matcher = load_matcher(self._config.method)
         self._held = HeldMaps(robots, self._config)
@@ -87,12 +90,12 @@ class Merger:
         Raises
         ------
         ConfigError
-            If an update is of a robot that is not among those of the merger.
+            If an update is of a robot that is not among those of the merger, or a belief is none.
+        GridError
+            If an update is no `Grid`.
         """
         robots = tuple(self.result.robots)
-        strangers = sorted(set(updates) - set(robots))
-        if strangers:
-            raise ConfigError(f"there are maps of {', '.join(strangers)}; expected only maps of {', '.join(robots)}")
+        refuse_others(updates, priors, robots)
         new = self._held.take(updates)
         if not new.updated and not is_last:
             self.result = replace(self.result, updated=(), changes=(), searched={})

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mapmerge.checks import shown
 from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError, GridError
 from mapmerge.grid import MAX_PERCENT, UNKNOWN, Grid
@@ -50,7 +51,7 @@ def merge(
     GridError
         If an array is no map.
     ConfigError
-        If there is no map, or settings do not fit together.
+        If there is no map, settings do not fit together, or an argument is of another kind.
 
     Examples
     --------
@@ -61,6 +62,8 @@ def merge(
     >>> print(result.robots["hall"].reason.message)
     not placed on kitchen: one of the maps shows no wall at all
     """
+    if isinstance(grids, (Grid, str)) or not isinstance(grids, Iterable):
+        raise ConfigError(f"grids are {shown(grids)}; expected several maps, or a mapping of names to maps")
     named = grids if isinstance(grids, Mapping) else {f"map{number}": grid for number, grid in enumerate(grids)}
     if not named:
         raise ConfigError("there is no map; expected at least one, the reference first")
@@ -71,7 +74,10 @@ def merge(
 def _as_grid(name: str, grid: GridLike, resolution_m: float | None) -> Grid:
     if isinstance(grid, Grid):
         return grid
-    cells = np.asarray(grid)
+    try:
+        cells = np.asarray(grid)
+    except ValueError as error:  # rows of different lengths
+        raise GridError(f"{name} is {shown(grid)}; expected a Grid, or an array [rows, columns]") from error
     if resolution_m is None:
         raise GridError(f"{name} is an array; give resolution_m, the side of its cells, or a Grid")
     if cells.dtype.kind not in "iu":

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mapmerge.checks import is_number, shown
+from mapmerge.errors import ConfigError
 from mapmerge.sim2 import Sim2, wrap_angle
 
 WITHIN_SIGMAS = 3.0
@@ -28,6 +30,11 @@ class Prior:
         Standard deviations along the target's axes, and of the turn.
     origin
         Who says so, in words that fit "the placement ...": "given for r2", "recorded in /tf".
+
+    Raises
+    ------
+    ConfigError
+        If one is of another kind, or a standard deviation is negative.
     """
 
     target_from_source: Sim2
@@ -35,6 +42,18 @@ class Prior:
     sigma_y_m: float
     sigma_yaw_rad: float
     origin: str = "given"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.target_from_source, Sim2):
+            raise ConfigError(
+                f"target_from_source is {shown(self.target_from_source)}; expected Sim2(x_m, y_m, yaw_rad)"
+            )
+        for name in ("sigma_x_m", "sigma_y_m", "sigma_yaw_rad"):
+            sigma = getattr(self, name)
+            if not is_number(sigma) or not sigma >= 0.0:
+                raise ConfigError(f"{name} is {shown(sigma)}; expected a number that is not negative")
+        if not isinstance(self.origin, str):
+            raise ConfigError(f"origin is {shown(self.origin)}; expected a text")
 
     def allows(self, target_from_source: Sim2) -> bool:
         """Tell whether a placement lies within the prior, in all three of its directions."""

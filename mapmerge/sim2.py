@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mapmerge.checks import is_number, shown
+from mapmerge.errors import MapMergeError
 from mapmerge.rounding import fixed
 
 Points = NDArray[np.float64]
@@ -36,6 +38,11 @@ class Sim2:
         Direction of the source frame's x axis in the target frame; kept in (−π, π].
     scale
         Target metres per source metre; positive.
+
+    Raises
+    ------
+    MapMergeError
+        If one is no number, the turn is not finite, or the scale not positive.
     """
 
     x_m: float = 0.0
@@ -44,9 +51,17 @@ class Sim2:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
+        for name in ("x_m", "y_m", "yaw_rad", "scale"):
+            value = getattr(self, name)
+            if type(value) is not float and not is_number(value):
+                raise MapMergeError(f"{name} is {shown(value)}; expected a number")
         if not 0.0 < self.scale < math.inf:
-            raise ValueError(f"scale is {self.scale}; expected a positive number")
-        object.__setattr__(self, "yaw_rad", wrap_angle(self.yaw_rad))
+            raise MapMergeError(f"scale is {shown(self.scale)}; expected a positive number")
+        try:
+            yaw_rad = wrap_angle(self.yaw_rad)
+        except (ValueError, OverflowError) as error:
+            raise MapMergeError(f"yaw_rad is {shown(self.yaw_rad)}; expected a finite number") from error
+        object.__setattr__(self, "yaw_rad", yaw_rad)
 
     def __str__(self) -> str:
         """Return it to read: ``x 4.50 m, y -1.20 m, yaw 90.0°``, and its scale if that is not 1."""

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 PathLike = str | os.PathLike[str]
 
 
+@keywords.known_only
 def merge(
     runs: PathLike | Sequence[PathLike] | Mapping[str, PathLike],
     *,
@@ -94,7 +95,8 @@ def merge(
     Raises
     ------
     UsageError
-        If these do not fit together. What is wrong with a recording is raised as `ReplayError` where it is read.
+        If these do not fit together, or a keyword is none of them. What is wrong with a recording is raised as
+        `ReplayError` where it is read.
 
     Examples
     --------
@@ -174,6 +176,7 @@ class MergeRun(Iterator[Event]):
                 return event.report
         raise UsageError("this run is over; call replay.merge anew")
 
+    @keywords.known_only
     def write(
         self,
         output: PathLike,

@@ -11,6 +11,7 @@ from decimal import Decimal
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from replay.errors import BadMessage, InputError, UsageError
+from replay.plain_text import brief
 from replay.skip_cause import SkipCause
 
 _UNITS = {"": 1, "B": 1, **{f"{k}B": 1000**n for n, k in enumerate("kMGT", 1)}}
@@ -19,6 +20,7 @@ _UNITS |= {f"{k}iB": 1024**n for n, k in enumerate("KMGT", 1)}
 _BY_NAME = {name.lower(): factor for name, factor in _UNITS.items()} | {k: 1000**n for n, k in enumerate("kmgt", 1)}
 _SIZE = re.compile(r"(\d+(?:\.\d*)?) ?([A-Za-z]*)", re.ASCII)
 _LEAST_BYTES = 1 << 20
+_MOST_BYTES = 1 << 63
 
 
 def size_to_bytes(text: str) -> int:
@@ -27,12 +29,14 @@ def size_to_bytes(text: str) -> int:
     Raises
     ------
     UsageError
-        If it is none, or less than 1 MiB.
+        If it is none, less than 1 MiB, or more than 8 EiB.
     """
     found = _SIZE.fullmatch(text)
     if found is None or found[2].lower() not in _BY_NAME:
-        raise UsageError(f"{text!r} is no size; expected one such as 2GiB, 500MB, or a number of bytes")
+        raise UsageError(f"{brief(repr(text))} is no size; expected one such as 2GiB, 500MB, or a number of bytes")
     size_bytes = int(Decimal(found[1]) * _BY_NAME[found[2].lower()])
+    if size_bytes > _MOST_BYTES:
+        raise UsageError(f"{brief(repr(text))} is more than any memory; expected a size such as 2GiB")
     if size_bytes < _LEAST_BYTES:
         raise UsageError(f"{text!r} is less than 1 MiB, in which there is no map; expected one such as 2GiB")
     return size_bytes

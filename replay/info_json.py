@@ -12,9 +12,9 @@ from replay.sources.losses import Loss
 SCHEMA = "replay.info/1"
 
 
-def info_text(summary: RunSummary, *, is_ascii: bool = False) -> str:
+def info_text(summary: RunSummary) -> str:
     """Return the summary as JSON: indented, in its own order, ending in a newline."""
-    return plain_json(json.dumps(as_json(summary), indent=2, ensure_ascii=is_ascii, allow_nan=False)) + "\n"
+    return plain_json(json.dumps(as_json(summary), indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
 
 
 def as_json(summary: RunSummary) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 import reprlib
@@ -9,23 +10,42 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from decimal import Decimal
+from functools import wraps
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, TypeGuard, TypeVar
+from typing import Any, ParamSpec, TypeGuard, TypeVar
 
 from mapmerge.config import MergeConfig
 from mapmerge.errors import ConfigError
 from replay.errors import UsageError
 from replay.footprint import size_to_bytes
 from replay.init_pose import InitPose
-from replay.options import TimeBound, seconds_to_ns
+from replay.options import MOST_NS, NS_PER_S, TimeBound, seconds_to_ns
+from replay.plain_text import brief
 from replay.runs import RunPath, TopicChoice
 
-_MOST_S = 1e12
 _MOST_JOBS = 999
 _POSE = "x_m, y_m and yaw_rad, and the standard deviation of each, if any"
 
 _Value = TypeVar("_Value")
+_Told = ParamSpec("_Told")
+
+
+def known_only(function: Callable[_Told, _Value]) -> Callable[_Told, _Value]:
+    """Return a function that refuses a keyword which it does not have, with the one that may have been meant.
+
+    For whoever reads or checks types its signature is what it was.
+    """
+    known = tuple(inspect.signature(function).parameters)
+
+    @wraps(function)
+    def call(*args: _Told.args, **told: _Told.kwargs) -> _Value:
+        for name in told:
+            if name not in known:
+                raise UsageError(f"{function.__name__} has no keyword {brief(name)}; {_meant(name, known)}")
+        return function(*args, **told)
+
+    return call
 
 
 def run_paths(runs: object) -> tuple[RunPath, ...]:
@@ -80,7 +100,7 @@ def time_bound(name: str, time: object) -> TimeBound | None:
 
 def nanoseconds(name: str, seconds: object) -> int:
     """Read a number of seconds, not negative."""
-    if not _is_number(seconds) or not 0.0 <= seconds <= _MOST_S:
+    if not _is_number(seconds) or not 0.0 <= seconds <= MOST_NS // NS_PER_S:
         raise UsageError(f"{name} is {_shown(seconds)}, which is no number of seconds; expected one such as 12.5")
     number = seconds if _is_whole(seconds) else float(seconds)
     return seconds_to_ns(f"{Decimal(str(number)):f}")
@@ -168,6 +188,19 @@ def _init_pose(robot: str, values: object) -> InitPose:
         raise UsageError(f"{name} has a number that is too large; expected {_POSE}") from error
     except UsageError as error:
         raise UsageError(f"init_poses: {str(error).removeprefix('--init-pose ')}") from error
+
+
+def _meant(name: str, known: Iterable[str]) -> str:
+    from replay.arguments import closest
+    from replay.settings.fields import leaves
+
+    offered = [each for each in known if each != "self"]
+    if found := closest(name, offered):
+        return f"did you mean {found[0]}?"
+    fields = [key for key in leaves() if key.rpartition(".")[2] == name]
+    if fields:
+        return f"it is {fields[0].replace('merge.', 'config.', 1)}, of a mapmerge.MergeConfig that is given as config"
+    return f"expected {', '.join(offered)}"
 
 
 def _is_number(value: object) -> TypeGuard[float]:

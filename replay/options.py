@@ -13,10 +13,15 @@ from typing import Any, Literal
 from mapmerge.config import MergeConfig
 from replay.errors import UsageError
 from replay.init_pose import InitPose
+from replay.plain_text import brief
 from replay.runs import RunPath, TopicChoice
 
 NS_PER_S = 1_000_000_000
 DEFAULT_REORDER_WINDOW_NS = 5 * NS_PER_S
+MOST_NS = 10**12 * NS_PER_S
+"""No time that is said is later, or as much earlier; reports are read as far as that, too."""
+MOST_DIGITS = 400
+"""Of a number that is said in words. Python reads no whole number of more than some thousand."""
 
 ImageChoice = Literal["none", "changed", "all"]
 ClockChoice = Literal["header", "log"]
@@ -29,11 +34,15 @@ def seconds_to_ns(text: str) -> int:
     Raises
     ------
     UsageError
-        If it is none.
+        If it is none, or more than `MOST_NS`.
     """
-    if not re.fullmatch(r"\d+(\.\d*)?|\.\d+", text):
-        raise UsageError(f"{text!r} is no number of seconds; expected one such as 12.5")
-    return int(Decimal(text) * NS_PER_S)
+    if len(text) <= MOST_DIGITS and re.fullmatch(r"\d+(\.\d*)?|\.\d+", text):
+        found_ns = Decimal(text) * NS_PER_S
+        if found_ns <= MOST_NS:
+            return int(found_ns)
+    raise UsageError(
+        f"{brief(repr(text))} is no number of seconds; expected one such as 12.5, of at most {MOST_NS // NS_PER_S}"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,17 +54,23 @@ class TimeBound:
 
     @staticmethod
     def parse(text: str) -> TimeBound:
-        """Read ``12.5`` (seconds after the first map), ``1700000000000000000ns`` or an ISO 8601 time."""
-        if re.fullmatch(r"\d+ns", text):
-            return TimeBound(int(text[:-2]), relative=False)
+        """Read ``12.5`` (seconds after the first map), ``1700000000000000000ns`` or an ISO 8601 time.
+
+        Raises
+        ------
+        UsageError
+            If it is none, or beyond `MOST_NS`.
+        """
         if re.fullmatch(r"[\d.]+", text):
             return TimeBound(seconds_to_ns(text), relative=True)
+        if len(text) <= MOST_DIGITS and re.fullmatch(r"-?\d+ns", text) and abs(int(text[:-2])) <= MOST_NS:
+            return TimeBound(int(text[:-2]), relative=False)
         try:
             moment = datetime.fromisoformat(text)
         except ValueError:
             raise UsageError(
-                f"{text!r} is no time; expected seconds after the first map such as 12.5, nanoseconds since 1970 "
-                "such as 1700000000000000000ns, or ISO 8601 such as 2026-05-01T12:00:00Z"
+                f"{brief(repr(text))} is no time; expected seconds after the first map such as 12.5, nanoseconds since "
+                "1970 such as 1700000000000000000ns, or ISO 8601 such as 2026-05-01T12:00:00Z"
             ) from None
         since = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
         beyond_us = re.search(r"[.,]\d{6}(\d{1,3})", text)  # which datetime leaves out

@@ -37,6 +37,16 @@ def plain_json(text: str) -> str:
     return "".join(each if each.isprintable() or each == "\n" else _json_escape(each) for each in text)
 
 
+def ascii_json(text: str) -> str:
+    r"""Return JSON with all that is not ASCII as \u escapes: it stands in its strings."""
+    return "".join(each if each.isascii() else _json_escape(each) for each in text)
+
+
+def ascii_toml(text: str) -> str:
+    r"""Return TOML with all that is not ASCII as \U escapes: it stands in texts in double quotes, and comments."""
+    return "".join(each if each.isascii() else f"\\U{ord(each):08x}" for each in text)
+
+
 def listed(names: Sequence[str], between: str = ", ") -> str:
     """Return names as a list, of very many the first ones and how many there are more."""
     more = len(names) - MOST_NAMED

@@ -185,10 +185,6 @@ def _reason(node: Node) -> str:
 
 
 def _inputs(node: Node) -> tuple[RunInput, ...]:
-    inputs = node.need("inputs").value
-    if not isinstance(inputs, list):
-        node.need("inputs").refuse("a list")
-    items = [Node(node.file, item, ("inputs", at)) for at, item in enumerate(inputs)]
     return tuple(
         RunInput(
             item.need("name").text(),
@@ -196,5 +192,5 @@ def _inputs(node: Node) -> tuple[RunInput, ...]:
             item.maybe("robots", Node.texts) or (),
             item.maybe("sha256", Node.text) or "",
         )
-        for item in items
+        for item in node.need("inputs").elements()
     )

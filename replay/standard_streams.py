@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import IO, Any, TextIO, cast
 
 from replay.errors import OutputError
+from replay.plain_text import ascii_json, ascii_toml
 
 _LAST_STANDARD = 2
 
@@ -66,6 +67,16 @@ def takes(text: str) -> bool:
     except UnicodeEncodeError:
         return False
     return True
+
+
+def write_json(text: str) -> None:
+    r"""Write JSON to standard output; if that lacks a character, all beyond ASCII as \u escapes, which readers undo."""
+    sys.stdout.write(text if takes(text) else ascii_json(text))
+
+
+def write_toml(text: str) -> None:
+    r"""Write TOML to standard output; if that lacks a character, all beyond ASCII as \U escapes, which readers undo."""
+    sys.stdout.write(text if takes(text) else ascii_toml(text))
 
 
 def quiet_stderr() -> IO[str]:

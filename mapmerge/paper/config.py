@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Annotated
 
-from mapmerge.settings import Settings
+from mapmerge.settings import Above, Settings, Within
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +30,10 @@ class RansacConfig(Settings):
         returned has the scale that they say.
     """
 
-    inlier_m: float = 0.2
+    inlier_m: Annotated[float, Above(0.0, 1000.0)] = 0.2
     in_both: bool = True
-    draws: int = 60_000
-    seed: int = 0
+    draws: Annotated[int, Within(1, 1_000_000)] = 60_000
+    seed: Annotated[int, Within(0, (1 << 63) - 1)] = 0
     min_arm_m: float = 1.5
     scale_tolerance: float = 0.03
 
@@ -69,19 +70,19 @@ class PaperConfig(Settings):
     """
 
     binary_threshold: float = 100.0
-    angle_step_rad: float = math.radians(0.5)
-    radon_bin_m: float = 0.1
-    closing_m: float = 0.15
-    interest_m: float = 0.45
-    reach_m: float = 1.0
+    angle_step_rad: Annotated[float, Within(0.001, 0.5)] = math.radians(0.5)
+    radon_bin_m: Annotated[float, Above(0.0, 10.0)] = 0.1
+    closing_m: Annotated[float, Within(0.0, 10.0)] = 0.15
+    interest_m: Annotated[float, Within(0.0, 10.0)] = 0.45
+    reach_m: Annotated[float, Within(0.0, 100.0)] = 1.0
     min_line_share: float = 0.7
-    min_wall_m: float = 0.15
-    max_features: int = 300
+    min_wall_m: Annotated[float, Within(0.0, 10.0)] = 0.15
+    max_features: Annotated[int, Within(1, 10_000)] = 300
     turn_tolerance_rad: float = math.radians(3.0)
-    max_models: int = 12
-    icp_reject_m: tuple[float, ...] = (0.6, 0.3)
-    icp_iterations: int = 30
-    max_side_cells: int = 1500
+    max_models: Annotated[int, Within(1, 1_000)] = 12
+    icp_reject_m: tuple[Annotated[float, Within(0.001, 1000.0)], ...] = (0.6, 0.3)
+    icp_iterations: Annotated[int, Within(0, 10_000)] = 30
+    max_side_cells: Annotated[int, Within(1, 10_000)] = 1500
     ransac: RansacConfig = field(default_factory=RansacConfig)
 
 
@@ -97,6 +98,6 @@ class ExistingConfig(Settings):
         Maps with more cells a side are worked on at a coarser resolution.
     """
 
-    max_features: int = 1000
-    max_side_cells: int = 1500
+    max_features: Annotated[int, Within(1, 10_000)] = 1000
+    max_side_cells: Annotated[int, Within(1, 10_000)] = 1500
     ransac: RansacConfig = RansacConfig(inlier_m=0.1)

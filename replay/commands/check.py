@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 from replay.errors import InputError, OutputError, ReplayError, UsageError
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE, interrupted_late
 from replay.flags import inputs, outputs, placing, rules, talk
-from replay.standard_streams import printing, say, takes
+from replay.standard_streams import printing, say, takes, write_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -250,8 +249,8 @@ def _tell(found: Sequence[Finding], report: Report, options: argparse.Namespace)
 
     with printing():
         if options.json or options.quiet:
-            text = report_text(report) if options.json else ""
-            sys.stdout.write(text if takes(text) else report_text(report, is_ascii=True))
+            if options.json:
+                write_json(report_text(report))
             for line in failing(found):
                 say(f"replay: {line}")
             return

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE
 from replay.flags.numbers import at_least_0
 from replay.plain_text import plain
-from replay.standard_streams import printing
+from replay.standard_streams import printing, write_json
 
 USAGE = "A B [options]"
 DESCRIPTION = """\
@@ -62,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     comparison = compare(before, after, Tolerance(*tolerances))
     with printing():
         if options.json:
-            sys.stdout.write(json_text(comparison))
+            write_json(json_text(comparison))
         else:
             for line in lines(comparison, options.before, options.after):
                 print(plain(line))

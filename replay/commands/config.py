@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
 from replay.exit_status import EXIT_DONE
 from replay.flags import inputs, outputs, placing, rules
-from replay.standard_streams import printing
+from replay.standard_streams import printing, write_toml
 
 USAGE = "[RUN ...] [options]"
 DESCRIPTION = """\
@@ -46,5 +45,5 @@ def run(options: argparse.Namespace) -> int:
     shown = shown_settings(command_parser("config"), options, merge)
     text = as_toml([item for item in shown if item.is_changed or not options.changed])
     with printing():
-        sys.stdout.write(text)
+        write_toml(text)
     return EXIT_DONE

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ from replay.errors import UsageError
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE
 from replay.flags.numbers import at_least_0
 from replay.plain_text import plain
-from replay.standard_streams import printing, say
+from replay.standard_streams import printing, say, write_json
 
 if TYPE_CHECKING:
     from replay.evaluation.truth import Truth
@@ -81,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
     of_map = _map_evaluation(options, truth) if options.true_map is not None else None
     with printing():
         if options.json:
-            sys.stdout.write(json_text(errors, of_map, limits))
+            write_json(json_text(errors, of_map, limits))
         else:
             for line in lines(errors, of_map, limits):
                 print(plain(line))

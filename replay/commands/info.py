@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE
 from replay.flags import inputs
 from replay.plain_text import plain
-from replay.standard_streams import printing, takes
+from replay.standard_streams import printing, write_json
 
 USAGE = "RUN [RUN ...] [options]"
 DESCRIPTION = """\
@@ -51,8 +50,7 @@ def run(options: argparse.Namespace) -> int:
     summary = summarise(inputs.run_options(options))
     with printing():
         if options.json:
-            text = info_text(summary)
-            sys.stdout.write(text if takes(text) else info_text(summary, is_ascii=True))
+            write_json(info_text(summary))
         else:
             for line in lines(summary):
                 print(plain(line))

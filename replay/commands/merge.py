@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from replay.exit_status import EXIT_DIFFERS, EXIT_DONE, interrupted_late
 from replay.flags import inputs, outputs, placing, rules, talk
 from replay.plain_text import listed, plain
-from replay.standard_streams import printing, say, takes
+from replay.standard_streams import printing, say, write_json
 
 if TYPE_CHECKING:
     from replay.events import Report
@@ -74,10 +74,10 @@ def _print(report: Report, options: argparse.Namespace) -> None:
     if options.quiet and not options.json:
         return
     with printing():
-        text = report_text(report) if options.json else table_text(report, options.color)
-        if options.json and not takes(text):
-            text = report_text(report, is_ascii=True)
-        sys.stdout.write(text)
+        if options.json:
+            write_json(report_text(report))
+        else:
+            sys.stdout.write(table_text(report, options.color))
 
 
 def _missing(report: Report) -> str:

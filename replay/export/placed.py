@@ -21,11 +21,12 @@ from replay.errors import InputError, UsageError
 from replay.events import Noted
 from replay.export.maps import THE_MAP, Maps, Say, grid_topics, maps_at, one_map
 from replay.export.same_inputs import refuse_left_out, refuse_others
-from replay.options import DEFAULT_REORDER_WINDOW_NS, ClockChoice, RunOptions, TimeBound
+from replay.options import RunOptions, TimeBound
 from replay.plain_text import listed
 from replay.report_file import holds_mcap, read_report
 from replay.run_result import RunInput, RunResult
 from replay.runs import RunPath, TopicChoice
+from replay.settings.of_run import reading_of
 from replay.sinks.mcap_file import topic_parts
 
 
@@ -139,6 +140,8 @@ def _as_merged(result: RunResult, recordings: Sequence[RunPath], merged: Sequenc
     ------
     UsageError
         If some of those that were merged are missing.
+    InputError
+        If the report's settings are not those of a run.
     """
     given = Counter(run.path.name for run in recordings)
     left = list(merged)
@@ -148,32 +151,7 @@ def _as_merged(result: RunResult, recordings: Sequence[RunPath], merged: Sequenc
             left.remove(item)
     refuse_left_out(left)
     settings = Node(result.name, result.settings, ("settings",))
-    clock: ClockChoice = "log" if result.settings.get("clock") == "log" else "header"
-    window_ns = settings.maybe("reorder_window_ns", Node.whole)
-    return RunOptions(
-        tuple(recordings),
-        tuple(result.robots),
-        _topics(result),
-        clock=clock,
-        start=settings.maybe("start", _bound),
-        stop=settings.maybe("stop", _bound),
-        reorder_window_ns=DEFAULT_REORDER_WINDOW_NS if window_ns is None else window_ns,
-        align_starts=bool(result.settings.get("align_starts")),
-        max_memory_bytes=settings.maybe("max_memory_bytes", Node.whole),
-    )
-
-
-def _bound(node: Node) -> TimeBound:
-    return TimeBound(node.need("ns").whole(), relative=node.need("relative").value is True)
-
-
-def _topics(result: RunResult) -> tuple[TopicChoice, ...]:
-    """Return the topics that the run was told."""
-    node = Node(result.name, result.settings, ("settings",)).get("topics")
-    if node is None or not isinstance(node.value, list):
-        return ()
-    items = [replace(node, value=value, keys=(*node.keys, at)) for at, value in enumerate(node.value)]
-    return tuple(TopicChoice(item.maybe("robot", Node.text), item.need("topic").text()) for item in items)
+    return RunOptions(tuple(recordings), tuple(result.robots), **reading_of(settings))
 
 
 def _end(result: RunResult) -> TimeBound | None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
+from replay.documents import MOST
 from replay.errors import UsageError
+from replay.plain_text import brief
 
 
 def at_least_0(flag: str, text: str) -> float:
@@ -13,12 +15,12 @@ def at_least_0(flag: str, text: str) -> float:
     Raises
     ------
     UsageError
-        If it is none, negative or not finite.
+        If it is none, negative, or larger than any number of a document.
     """
     try:
         number = float(text)
     except ValueError:
         number = math.nan
-    if not 0.0 <= number < math.inf:
-        raise UsageError(f"{flag} {text}: expected a number, 0 or more")
+    if not 0.0 <= number <= MOST:
+        raise UsageError(f"{flag} {brief(text)}: expected a number from 0 to {MOST:g}")
     return number

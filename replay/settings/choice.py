@@ -11,6 +11,7 @@ from typing import Any
 
 from replay.arguments import Parser, none_of
 from replay.errors import UsageError
+from replay.options import MOST_DIGITS
 from replay.settings import fields
 from replay.settings.documents import Said, read_assignment, read_settings
 from replay.settings.keys import all_settings, known_keys, settings_of
@@ -107,9 +108,12 @@ def _text(said: Said) -> str:
     value = said.value
     if isinstance(value, (dict, list)):
         raise UsageError(f"{said.origin} is {fields.said(value)}; expected one value")
-    if isinstance(value, Decimal) and value.is_finite():
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Decimal) and value.is_finite() and abs(value.adjusted()) < MOST_DIGITS:
+        # of more, 1E+999 is said, which no flag takes: written out it may fill the memory
         return f"{value:f}"
-    return value.isoformat() if isinstance(value, (datetime, date, time)) else fields.said(value).strip('"')
+    return value.isoformat() if isinstance(value, (datetime, date, time)) else fields.said(value)
 
 
 def _placed(run: str, folder: Path) -> str:

@@ -69,7 +69,7 @@ def refuse_unknown(key: str, known: Iterable[str], origin: str) -> None:
     """
     name = key.rpartition(".")[2]
     if name in OF_ONE_CALL:
-        raise UsageError(f"{origin}: is said for each run anew; give --{name} on the command line")
+        raise UsageError(f"{origin}: is said for each run anew; give --{name.replace('_', '-')} on the command line")
     meant = _meant(key, list(known))
     hint = f"did you mean {meant}? " if meant else ""
     raise UsageError(f"{origin}: there is no such setting; {hint}`replay config` lists all")

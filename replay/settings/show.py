@@ -17,6 +17,7 @@ from tomlkit.items import Table
 from mapmerge.config import MergeConfig
 from replay import __version__
 from replay.arguments import Parser
+from replay.options import MOST_DIGITS
 from replay.settings import fields
 from replay.settings.keys import ELSEWHERE, settings_of
 
@@ -150,6 +151,8 @@ def _value(action: argparse.Action, said: Any) -> Any:  # noqa: ANN401 - as the 
 
 def _number(text: str) -> int | float | str:
     """Return text as the number that it says, if that number says all of it."""
+    if len(text) > MOST_DIGITS:
+        return text
     if re.fullmatch(r"[0-9]+", text):
         return int(text)
     try:

@@ -10,9 +10,9 @@ from replay.plain_text import plain_json
 from replay.sinks.partial_file import PartialFile, output_errors
 
 
-def report_text(report: Report, *, is_ascii: bool = False) -> str:
+def report_text(report: Report) -> str:
     """Return a report as it is written: indented, in the report's own order, ending in a newline."""
-    return plain_json(json.dumps(report, indent=2, ensure_ascii=is_ascii, allow_nan=False)) + "\n"
+    return plain_json(json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
 
 
 class JsonSink:

@@ -188,6 +188,14 @@ def test_the_merged_map_is_like_its_own(replay: Program, outcome: Path) -> None:
     }
 
 
+def test_a_tolerance_that_no_map_has_is_refused(replay: Program, outcome: Path) -> None:
+    assert replay("export", outcome, "-o", "true").status == 0
+    ran = evaluated(replay, outcome, of_r2(), "--true-map", "true.yaml", "--tolerance-m", "1e300")
+    assert ran.error == "--tolerance-m 1e300: expected a number from 0 to 1e+12"
+    ran = evaluated(replay, outcome, of_r2(), "--true-map", "true.yaml", "--tolerance-m", "1e12")
+    assert (ran.status, ran.err) == (0, "")
+
+
 def test_a_true_map_lies_where_the_truth_says(replay: Program, outcome: Path) -> None:
     """The map of r1, in a frame of its own, is true where it lies truly, and false a metre beside that."""
     floor_from_true = Sim2(5.0, -3.0, 0.4)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -162,3 +163,34 @@ def test_streams_that_know_no_more_than_ascii(tmp_path: Path, command: str) -> N
         assert json.loads(done.stdout) == json.loads((tmp_path / "out.json").read_text("utf-8"))
     elif name != "recover":
         assert "gr\\xf6\\xdfe" in said
+
+
+def test_what_programs_read_is_whole_where_streams_know_no_more_than_ascii(tmp_path: Path) -> None:
+    """Escapes of Python are none of JSON or TOML."""
+    robots = ("größe", "𝄞")
+    runs = [tmp_path / name for name in ("a.json", "b.json")]
+    path = write_mcap(tmp_path / "run.mcap", [seen("r1", 0.0, topic="/größe/map"), seen("r2", 1.0, topic="/𝄞/map")])
+    (tmp_path / "truth.json").write_text(json.dumps({"reference": robots[0], "robots": {}}), encoding="utf-8")
+    (tmp_path / "expect.yaml").write_text("robots: {größe: {status: reference}}\n", encoding="utf-8")
+
+    def said(*arguments: object) -> bytes:
+        asked = {**quiet(), "PYTHONIOENCODING": "ascii"}
+        done = subprocess.run([*PROGRAM, *arguments], cwd=tmp_path, env=asked, capture_output=True, timeout=60)
+        assert done.returncode in (0, 1), done.stderr
+        assert done.stdout.isascii()
+        return done.stdout
+
+    for run_path, order in zip(runs, (robots, robots[::-1]), strict=True):
+        report = json.loads(
+            said("merge", path, "-o", run_path.with_suffix(".mcap"), *MERGE[2:], "--json", "--robots", ",".join(order))
+        )
+        assert report == json.loads(run_path.read_text("utf-8"))
+        assert set(report["robots"]) == set(robots)
+    assert {item["map_topic"] for item in json.loads(said("info", path, "--json"))["robots"]} == {
+        f"/{robot}/map" for robot in robots
+    }
+    assert "größe" in str(json.loads(said("compare", *runs, "--json")))
+    assert "𝄞" in str(json.loads(said("evaluate", runs[0], "--truth", "truth.json", "--json")))
+    assert set(json.loads(said("check", path, "--expect", "expect.yaml", "--json"))["robots"]) == set(robots)
+    settings = tomllib.loads(said("config", "--robots", ",".join(robots)).decode("ascii"))
+    assert settings["robots"] == list(robots)

@@ -1,21 +1,25 @@
 """Settings: what is refused, and where the classes of cells begin."""
 
+import json
 import math
-from dataclasses import fields
+import re
+from dataclasses import asdict, dataclass
+from typing import Annotated
 
+import numpy as np
 import pytest
 
 from mapmerge.config import (
     HIGHEST_CONFIDENCE,
     CellConfig,
     MergeConfig,
+    RansacConfig,
     RefineConfig,
     SearchConfig,
-    SlackConfig,
     VerifyConfig,
 )
 from mapmerge.errors import ConfigError, GridError, MapMergeError
-from mapmerge.settings import _DIVISORS, Settings
+from mapmerge.settings import Above, Settings
 
 
 def test_errors_form_one_tree():
@@ -46,19 +50,59 @@ class TestNumbers:
         with pytest.raises(ConfigError, match=name):
             SearchConfig(**{name: 0})
 
-    def test_all_that_is_said_to_be_divided_by_is_a_setting(self):
-        """A setting that was renamed must not lose its check."""
-        kinds = Settings.__subclasses__()
-        assert {field.name for kind in kinds for field in fields(kind)} >= _DIVISORS
-        with pytest.raises(ConfigError, match="stiffness_m"):
-            SlackConfig(stiffness_m=0)
+    def test_limits_are_declared_with_the_fields(self):
+        """A setting that is renamed, or another one of its name, must not lose its check or get one."""
+
+        @dataclass(frozen=True, slots=True)
+        class Own(Settings):
+            share: Annotated[float, Above(0.0, 1.0)] = 0.5
+            cell_m: float = 0.0
+
+        assert Own(1, 0.0) == Own(share=1.0)
+        with pytest.raises(ConfigError, match=r"^share is 0; expected a number more than 0, at most 1$"):
+            Own(share=0)
+
+    @pytest.mark.parametrize(
+        ("settings", "name", "value", "said"),
+        [
+            (VerifyConfig, "min_overlap_m2", "3", "min_overlap_m2 is '3'; expected a number from 0 to 1e+12"),
+            (VerifyConfig, "min_overlap_m2", True, "min_overlap_m2 is True; expected a number"),
+            (VerifyConfig, "near_m", 1e9, "near_m is 1000000000.0; expected a number from 0 to 20"),
+            (SearchConfig, "weighed", 10**400, "weighed is 1000"),
+            (SearchConfig, "weighed", 10**5000, "weighed is a number of too many digits; expected a whole number from"),
+            (SearchConfig, "weighed", 8.5, "weighed is 8.5; expected a whole number"),
+            (SearchConfig, "free_weights", [], "free_weights is []; expected 1 to 100 numbers, each from 0"),
+            (SearchConfig, "free_weights", 1.0, "free_weights is 1.0; expected 1 to 100 numbers"),
+            (SearchConfig, "rotations", (4,), "rotations is (4,); expected 2 whole numbers, each from 0 to 1000"),
+            (RefineConfig, "reject_m", ("0.3",), "reject_m is ('0.3',); expected 1 to 100 numbers"),
+            (RansacConfig, "in_both", 1, "in_both is 1; expected True or False"),
+            (MergeConfig, "verify", {"min_overlap_m2": 3}, "verify is {'min_overlap_m2': 3}; expected a VerifyConfig"),
+            (MergeConfig, "method", None, "method is None; expected a text"),
+            (MergeConfig, "scale", "fre", "scale is 'fre'; expected metadata or free"),
+            (MergeConfig, "scale", np.zeros((2, 2)), "scale is array("),
+        ],
+        ids=lambda value: value if isinstance(value, str) else type(value).__name__,
+    )
+    def test_values_of_another_kind_are_refused_in_one_line(self, settings, name, value, said):
+        with pytest.raises(ConfigError, match=f"^{re.escape(said)}") as refused:
+            settings(**{name: value})
+        assert len(str(refused.value)) < 200
+        assert "\n" not in str(refused.value)
+
+    def test_numbers_of_numpy_and_lists_become_those_of_python(self):
+        weights = [np.float64(0.5), np.int8(1)]
+        config = SearchConfig(weighed=np.int64(4), cell_m=np.float16(0.5), free_weights=weights)
+        assert config == SearchConfig(weighed=4, cell_m=0.5, free_weights=(0.5, 1))
+        assert {type(each) for each in (config.weighed, config.cell_m, *config.free_weights)} == {int, float}
+        assert json.loads(json.dumps(asdict(config)))["weighed"] == 4
+        assert hash(config)
 
     @pytest.mark.parametrize("reject_m", [(0.8, -0.1), (math.nan,), (0.4, math.inf), (0.0,)])
     def test_distances_of_a_sequence_are_checked_one_by_one(self, reject_m):
         with pytest.raises(ConfigError, match="reject_m"):
             RefineConfig(reject_m=reject_m)
 
-    @pytest.mark.parametrize("value", [1.001, 99.9])
+    @pytest.mark.parametrize("value", [0, 0.0, 1.001, 99.9])
     def test_a_confidence_is_a_probability(self, value):
         with pytest.raises(ConfigError, match="min_confidence"):
             VerifyConfig(min_confidence=value)
@@ -71,7 +115,7 @@ class TestNumbers:
                 MergeConfig(**config)
 
     def test_zero_is_a_fine_threshold(self):
-        assert VerifyConfig(min_overlap_m2=0.0, min_matched_wall_m=0, min_confidence=0.0).min_confidence == 0.0
+        assert VerifyConfig(min_overlap_m2=0.0, min_matched_wall_m=0).min_overlap_m2 == 0.0
         assert SearchConfig(free_weights=(0.0, 1.0), working_cell_m=0.0).free_weights == (0.0, 1.0)
 
     @pytest.mark.parametrize("value", [(-0.5, 1.0), (math.nan,), (1.0, math.inf)])

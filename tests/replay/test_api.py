@@ -146,6 +146,8 @@ def test_keywords_are_called_as_settings() -> None:
         ({"stop": "noon"}, "is no time"),
         ({"init_poses": {"r2": (1, 2)}}, "init_poses of r2 has 2 numbers; expected x_m, y_m and yaw_rad"),
         ({"min_confidence": 2.0}, "min_confidence is 2.0"),
+        ({"min_confidence": 0}, "min_confidence is 0.0; expected a number more than 0, at most 1"),
+        ({"start": "1" * 5000 + "ns"}, "start: '1111.*… is no time; expected seconds"),
         ({"max_memory": "much"}, "max_memory: 'much' is no size"),
         ({"max_memory": -5}, "max_memory is -5; expected a number of bytes"),
         ({"max_memory": 0}, "max_memory: '0' is less than 1 MiB"),
@@ -183,6 +185,13 @@ def test_keywords_are_called_as_settings() -> None:
         ({"config": {"method": "paper"}}, "config is .*; expected a MergeConfig"),
         ({"strict": "no"}, "strict is 'no'; expected True or False"),
         ({"use_tf": 1}, "use_tf is 1"),
+        ({"robot": ["r1"]}, "^merge has no keyword robot; did you mean robots\\?$"),
+        ({"init_pose": {}}, "^merge has no keyword init_pose; did you mean init_poses\\?$"),
+        (
+            {"min_overlap_m2": 3},
+            "no keyword min_overlap_m2; it is config.verify.min_overlap_m2, of a",
+        ),
+        ({"x" * 9999: 3}, "^merge has no keyword x{99}…; expected runs, robots, topics, "),
     ],
 )
 def test_what_does_not_fit_is_refused_at_once(told: dict[str, object], said: str) -> None:
@@ -205,6 +214,7 @@ def test_what_is_no_recording_is_refused(runs: object) -> None:
         ({"every_s": -1}, "every_s is -1"),
         ({"rrd": "no"}, "rrd is 'no'; expected True or False"),
         ({"force": None}, "force is None"),
+        ({"copy_map": True}, "^write has no keyword copy_map; did you mean copy_maps\\?$"),
     ],
 )
 def test_what_cannot_be_written_is_refused(tmp_path: Path, told: dict[str, object], said: str) -> None:

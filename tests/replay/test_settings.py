@@ -16,14 +16,16 @@ from mapmerge.config import MergeConfig
 from replay.arguments import command_parser
 from replay.commands import COMMANDS
 from replay.documents import Node
-from replay.errors import UsageError
+from replay.errors import InputError, UsageError
 from replay.init_pose import InitPose
-from replay.options import OutputOptions, RunOptions, TimeBound
+from replay.options import MOST_NS, OutputOptions, RunOptions, TimeBound, seconds_to_ns
 from replay.runs import RunPath, TopicChoice
 from replay.settings import fields as merge_fields
 from replay.settings import keys
+from replay.settings.choice import chosen_by
 from replay.settings.documents import read_assignment, read_settings
-from replay.settings.of_run import document_of
+from replay.settings.of_run import document_of, reading_of
+from replay.settings.show import as_toml, shown_settings
 
 TAKING = [name for name in COMMANDS if command_parser(name).takes_settings]
 ALL = keys.known_keys(keys.all_settings())
@@ -160,6 +162,37 @@ def test_the_settings_of_a_run_are_those_of_a_file(tmp_path: Path) -> None:
     assert sorted(document["merge"]) == sorted(item.name for item in fields(MergeConfig))
 
 
+@pytest.mark.parametrize("text", ["1969-01-01", "0001-01-01", "9999-12-31", "-5ns", "1000000000000", "0.000000001"])
+def test_any_time_that_a_run_takes_is_read_from_its_report(tmp_path: Path, text: str) -> None:
+    bound = TimeBound.parse(text)
+    settings = RunOptions((), start=bound, stop=bound, reorder_window_ns=MOST_NS).settings()
+    path = tmp_path / "out.json"
+    path.write_text(json.dumps({"schema": "replay.report/1", "settings": settings}), encoding="utf-8")
+    chosen = chosen_by(command_parser("merge"), {"config": path})
+    assert [TimeBound.parse(str(chosen[name])) for name in ("start", "stop")] == [bound, bound]
+    assert seconds_to_ns(str(chosen["reorder_window"])) == MOST_NS
+    told = reading_of(Node(path, json.loads(path.read_text(encoding="utf-8"))).need("settings"))
+    assert (told["start"], told["stop"], told["reorder_window_ns"]) == (bound, bound, MOST_NS)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"clock": "sun"}, "settings.clock is 'sun'; expected header or log"),
+        ({"start": {"ns": -1, "relative": True}}, "settings.start.ns is -1; expected a whole number, 0 or more"),
+        ({"start": {"ns": MOST_NS + 1, "relative": False}}, "settings.start.ns is .*; expected a whole number of nano"),
+        ({"stop": {"ns": 1}}, "settings.stop has no 'relative'"),
+        ({"align_starts": "no"}, "settings.align_starts is 'no'; expected true or false"),
+        ({"topics": "x"}, "settings.topics is 'x'; expected a list"),
+    ],
+)
+def test_exports_read_settings_as_files_are_read(change: dict[str, object], said: str) -> None:
+    settings = Node(Path("out.json"), {**RunOptions(()).settings(), **change}, ("settings",))
+    for read in (reading_of, document_of):
+        with pytest.raises(InputError, match=said):
+            read(settings)
+
+
 def test_reports_of_runs_that_were_not_written_have_settings_too(tmp_path: Path) -> None:
     settings = {**RunOptions(()).settings(), "outputs": None}
     assert document_of(Node(Path("out.json"), settings))["outputs"] == {}
@@ -221,6 +254,24 @@ def test_toml_that_cannot_be_read_is_refused(tmp_path: Path, text: str) -> None:
 def test_a_number_that_is_too_large_is_none() -> None:
     with pytest.raises(UsageError, match="expected a number"):
         merge_fields.read("merge.verify.min_overlap_m2", 10**400, "x")
+
+
+@pytest.mark.parametrize("value", ["1e300000", "1e999999999", "-1e999999999", "1e-999999999", "9" * 4000])
+@pytest.mark.parametrize(
+    "key", ["time.start", "time.reorder_window_s", "outputs.every_s", "rules.max_memory", "rules.jobs"]
+)
+def test_a_number_of_very_many_digits_is_not_written_out(key: str, value: str) -> None:
+    parser = command_parser("config")
+    chosen = chosen_by(parser, {"set": [f"{key}={value}"]})
+    (text,) = (value for name, value in chosen.items() if name not in ("merge_fields", "origins"))
+    assert len(str(text)) <= 4000
+    options = argparse.Namespace(**{**vars(parser.parse_args([])), **chosen})
+    assert as_toml([item for item in shown_settings(parser, options, MergeConfig()) if item.is_changed])
+
+
+def test_quotes_of_a_text_are_its_own() -> None:
+    chosen = chosen_by(command_parser("merge"), {"set": ["outputs.report='\"a\".html'", "rules.max_memory='\"'"]})
+    assert (str(chosen["report"]), chosen["max_memory"]) == ('"a".html', '"')
 
 
 def test_what_adds_to_lists_is_named_for_several() -> None:
