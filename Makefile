@@ -44,10 +44,10 @@ faults: $(VENV)/.dev ## try damaged recordings for a minute
 	$(BIN)/python -m benchmarks.faults --seconds 60
 
 pictures: $(VENV)/.runtime ## take the pictures of the docs anew; needs a graphics card or mesa-vulkan-drivers, and REPLAY_DATA
-	PYTHONPATH=. $(BIN)/python scripts/pictures.py
+	$(BIN)/python scripts/pictures.py
 
 reports: $(VENV)/.dev ## write docs/reports anew, and its picture; needs REPLAY_DATA, chromium and its driver
-	PYTHONPATH=. $(BIN)/python scripts/reports.py
+	$(BIN)/python scripts/reports.py
 
 lock: $(TOOLS)/.installed ## write requirements/ anew after pyproject.toml has changed; UPGRADE=1: the newest versions
 	$(TOOLS)/bin/python scripts/lock.py $(if $(UPGRADE),--upgrade)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.fitting import KNOTS, Array, Models, fit_array, fitted, standings
+from benchmarks.flags import file
 from benchmarks.observations import Observation, groups, read
 from benchmarks.reliability import binned, diagram, wilson
 from mapmerge.config import MergeConfig
@@ -138,10 +139,13 @@ def _share(
 def main() -> None:
     """Fit, and say how well it holds."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else None)
-    parser.add_argument("observations", type=Path)
+    parser.add_argument("observations", type=file, help="what benchmarks.collect wrote")
     parser.add_argument("--write", action="store_true", help="replace mapmerge/match/calibration.py")
     options = parser.parse_args()
-    everything = read(options.observations)
+    try:
+        everything = read(options.observations)
+    except (ValueError, TypeError, KeyError) as error:
+        parser.error(f"{options.observations}: these are no observations of benchmarks.collect: {error}")
     fit = [item for item in everything if not item.held_out]
     held_out = [item for item in everything if item.held_out]
     if not fit or not held_out:

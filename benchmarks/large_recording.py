@@ -21,6 +21,7 @@ from typing import Literal
 
 import numpy as np
 
+from benchmarks import flags
 from benchmarks.huge_mission import HugeMission
 from benchmarks.large_writers import WRITERS, Message
 from benchmarks.long_mission import SECOND_NS, START_NS
@@ -183,12 +184,14 @@ def merged(path: Path, work: Path) -> Ended | str:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--work", type=Path, help="folder for the recordings; a temporary one by default")
+    parser.add_argument("--work", type=flags.folder, help="folder for the recordings; a temporary one by default")
     parser.add_argument("--kinds", nargs="+", choices=tuple(SIDES), default=tuple(SIDES))
     parser.add_argument("--formats", nargs="+", choices=tuple(WRITERS), default=tuple(WRITERS))
-    parser.add_argument("--gib", type=float, default=4.2, help="size of each recording (default: %(default)s)")
-    parser.add_argument("--small", type=int, default=2_000_000, help="small messages (default: %(default)s)")
+    parser.add_argument("--gib", type=flags.size, default=4.2, help="size of each recording (default: %(default)s)")
+    parser.add_argument("--small", type=flags.count, default=2_000_000, help="small messages (default: %(default)s)")
     given = parser.parse_args(arguments)
+    if given.work is not None:
+        given.work.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=given.work, prefix="large-") as folder:
         for line in lines(given.kinds, given.formats, int(given.gib * 2**30), given.small, Path(folder)):
             print(line, flush=True)

@@ -5,6 +5,7 @@ The pipeline takes matchers only; here recipes, as that of m-explore, are given 
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -86,6 +87,7 @@ def _show(rows: Sequence[tuple[str, ...]]) -> None:
 
 def main() -> int:
     """Print the table."""
+    argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0]).parse_args()
     folder = data_folder()
     if folder is None:
         print(f"there are no recordings; set {VARIABLE} to the folder that holds real/", file=sys.stderr)

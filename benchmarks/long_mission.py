@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks import flags
 from benchmarks.made_once import recorded
 from mapmerge.grid import UNKNOWN, Grid
 from mapmerge.sim2 import Points, Sim2
@@ -40,6 +41,9 @@ _SCAN_EVERY_M = 0.8
 _LIDAR = Lidar(360, max_range_m=12.0, noise_m=0.01, dropout=0.01)
 SECOND_NS = 1_000_000_000
 LAG_NS = 20_000_000
+
+
+LEAST_SIDE_CELLS = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,12 +172,14 @@ def _noting_the_last(events: Iterable[MapEvent], last: dict[str, Grid]) -> Itera
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the recording of a mission and say where it is."""
     parser = argparse.ArgumentParser(description="Make the recording of a long mission, unless it is there.")
-    parser.add_argument("--work", type=Path, required=True, help="folder that it is kept in")
-    parser.add_argument("--robots", type=int, default=2)
-    parser.add_argument("--updates", type=int, default=300, help="maps that each robot publishes")
-    parser.add_argument("--side", type=int, default=2000, help="about so many cells a side have the last maps")
+    parser.add_argument("--work", type=flags.folder, required=True, help="folder that it is kept in")
+    parser.add_argument("--robots", type=flags.count, default=2)
+    parser.add_argument("--updates", type=flags.count, default=300, help="maps that each robot publishes")
+    parser.add_argument("--side", type=flags.count, default=2000, help="about so many cells a side have the last maps")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)
+    if options.side < LEAST_SIDE_CELLS:
+        parser.error(f"--side {options.side}: a floor has {LEAST_SIDE_CELLS} cells a side at least")
     options.work.mkdir(parents=True, exist_ok=True)
     mission = Mission(options.robots, options.updates, options.side, seed=options.seed)
     print(recorded(mission, options.work))

@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from benchmarks import flags
 from benchmarks.data import data_folder
 from benchmarks.paper_cases import (
     MAX_ERROR_DEG,
@@ -117,7 +118,7 @@ def print_three(folder: Path, cases: list[Case], method: str, suffix: str) -> Me
 def main() -> int:
     """Print all tables."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else None)
-    parser.add_argument("--pictures", type=Path, metavar="DIR", help="write pictures into this folder")
+    parser.add_argument("--pictures", type=flags.folder, metavar="DIR", help="write pictures into this folder")
     parser.add_argument("--no-noise", action="store_true", help="leave the sweep over lidar noise out")
     options = parser.parse_args()
     root = data_folder()

@@ -20,6 +20,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from xml.etree import ElementTree as ET
 
+from benchmarks.flags import new_file
+
 _SCRIPT = "import sys; from replay.cli import main; sys.exit(main())"
 _SVG, _INFERNO = "{http://www.w3.org/2000/svg}", "{http://github.com/jonhoo/inferno}"
 REST, PREPARING, RERUN, IMAGES = "rest", "preparing maps", "writing .rrd", "images"
@@ -112,7 +114,9 @@ def sample(recording: Path, flame_graph: Path, flags: Sequence[str]) -> None:
         command = [str(program), "record", "--format", "flamegraph", "--output", str(flame_graph), "--", *replay]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if not Path(folder, "out.mcap").exists() or not flame_graph.exists():
-            raise RuntimeError(f"{' '.join(command)}: {done.stderr.strip()}")
+            said = done.stderr.strip().splitlines() or ["it said nothing"]
+            errors = [line for line in said if "error" in line.lower()]
+            raise RuntimeError(f"{recording} cannot be sampled: {(errors or said)[-1].strip()}")
 
 
 def lines(found: Mapping[str, float]) -> list[str]:
@@ -126,10 +130,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         description="Write a flame graph of a replay, and print what share of the time each part takes.",
         epilog="All other flags are those of replay merge, such as --no-rrd --images none.",
     )
-    parser.add_argument("recording", type=Path)
-    parser.add_argument("--output", type=Path, required=True, help="the flame graph, an .svg")
+    parser.add_argument("recording", type=Path, metavar="RUN")
+    parser.add_argument("--output", type=new_file, required=True, help="the flame graph, an .svg")
     options, flags = parser.parse_known_args(arguments)
-    sample(options.recording, options.output, flags)
+    try:
+        sample(options.recording, options.output, flags)
+    except RuntimeError as error:
+        parser.error(str(error))
     print("\n".join(lines(shares(list(frames(options.output))))))
 
 

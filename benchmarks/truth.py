@@ -23,6 +23,7 @@ from benchmarks.cases import cases
 from benchmarks.criteria import Criterion
 from benchmarks.data import data_folder
 from benchmarks.distribution import distribution
+from benchmarks.flags import count, new_file, share
 from benchmarks.merged_sets import PairOutcome, SetOutcome, pair_outcomes, set_outcome
 from benchmarks.methods import DEFAULT, names
 from benchmarks.published import MapSet, map_sets
@@ -74,10 +75,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS, help="what to measure; all by default")
     parser.add_argument("--method", choices=names(), default=DEFAULT, help="which method")
     parser.add_argument("--compare", action="store_true", help="all methods and recipes side by side")
-    parser.add_argument("--share", type=float, default=1.0, help="share of the simulated pairs, for a quick look")
-    parser.add_argument("--processes", type=int, default=2, help="how many work at once")
+    parser.add_argument("--share", type=share, default=1.0, help="share of the simulated pairs, for a quick look")
+    parser.add_argument("--processes", type=count, default=2, help="how many work at once")
     parser.add_argument("--distribution", action="store_true", help="only compare scores of simulated and real pairs")
-    parser.add_argument("--json", type=Path, help="write all results to this file")
+    parser.add_argument("--json", type=new_file, help="write all results to this file")
     return parser
 
 

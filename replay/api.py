@@ -80,7 +80,7 @@ def merge(
         written, else ``none``.
     trajectories
         Of which recordings it is read from ``/tf`` where robots drove: ``none``, ``auto`` (not of large ones) or
-        ``all``. None: ``auto`` where the Rerun recording is written, else ``none``.
+        ``all``. None: ``auto`` where the Rerun recording or the page is written, else ``none``.
     strict
         Whether a message that cannot be used ends the run.
     jobs
@@ -224,7 +224,7 @@ class MergeRun(Iterator[Event]):
             copy_maps=keywords.truth("copy_maps", copy_maps),
             force=keywords.truth("force", force),
         )
-        trajectories: TrajectoryChoice = self._written_trajectories if rrd else "none"
+        trajectories: TrajectoryChoice = self._written_trajectories if rrd or report is not None else "none"
         options = replace(self.options, images=self._written_images, trajectories=trajectories)
         self._events = _nothing()
         return merge_into(lambda: open_sinks(written), options, written)

@@ -157,7 +157,7 @@ class Merged:
     moved
         Where robots were since the tick before, where that was recorded and is wanted.
     remarks
-        What is to be said of ``moved``, for who looks on; never part of a report.
+        What is to be said of ``moved``, for who looks on; never part of a report as values.
     """
 
     stamp_ns: int

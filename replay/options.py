@@ -103,7 +103,7 @@ class RunOptions:
         setting of a machine: the same limit gives the same outcome everywhere.
     trajectories
         Of which recordings it is read where robots drove: ``auto`` leaves out large ones. It changes no outcome, and
-        is shown only.
+        is shown only, in the Rerun recording and on the page.
     jobs
         How many threads work at once: more than one read ahead, match pairs and write beside the merging. The outcome
         is the same.

@@ -15,6 +15,9 @@ STEP_RAD = 0.1
 MOST_POSES = 10_000
 """After so many poses of a robot the steps are twice as long, and so on."""
 
+JUMP_M = 3.0
+"""Nobody drives so far from one pose to the next: there a line is parted."""
+
 INTERVAL_NS = 80_000_000
 """Least time between two looks at a robot: ten transforms a second are all seen, and not many more."""
 

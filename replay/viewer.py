@@ -18,7 +18,7 @@ from replay.path_errors import path_errors
 LOOPBACK = "127.0.0.1"
 INSTEAD_OF_LIVE = "leave --view out, and look at the recording elsewhere when it is written"
 
-_RRD_MAGIC = b"RRF"
+RRD_MAGIC = b"RRF"
 _MCAP_MAGIC = b"\x89MCAP0\r\n"
 _HEAD_BYTES = 16
 _START_S = 30.0
@@ -172,7 +172,7 @@ def _refuse_unreadable(path: Path) -> None:
             raise InputError(f"{path}: this is no file; expected a Rerun recording, OUT.rrd of `replay merge`")
         with path.open("rb") as file:
             head = file.read(_HEAD_BYTES)
-    if not head.startswith((_RRD_MAGIC, _MCAP_MAGIC)):
+    if not head.startswith((RRD_MAGIC, _MCAP_MAGIC)):
         raise InputError(
             f"{path}: this is neither a Rerun recording nor an MCAP; expected OUT.rrd of `replay merge`, which makes "
             "one of other recordings"

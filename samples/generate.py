@@ -233,7 +233,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--true-maps", action="store_true", help="write the floors as saved maps, and no recordings")
     parser.add_argument("--only", choices=sorted(RECIPES), help="make just this one")
     options = parser.parse_args(arguments)
-    options.out.mkdir(parents=True, exist_ok=True)
+    try:
+        options.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(f"{options.out}: {error.strerror}")
     for name in [options.only] if options.only else RECIPES:
         (write_true_map if options.true_maps else generate)(name, options.out, options.seed)
         print(f"{name}: written to {options.out}")

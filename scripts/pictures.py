@@ -9,11 +9,15 @@ real/, and without it only the first is taken. See scripts/screenshot.py for wha
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+
+if not __package__:  # run as a script: only this folder is on the path
+    sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from replay.cli import main as replay
 from scripts.screenshot import taken
@@ -54,6 +58,7 @@ SHOTS = (
 
 def main() -> int:
     """Take all pictures that can be taken; 1 if a view complains."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     data = os.environ.get("REPLAY_DATA")
     found: list[str] = []
     with tempfile.TemporaryDirectory() as folder:

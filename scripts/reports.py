@@ -16,6 +16,9 @@ from pathlib import Path
 
 from PIL import Image
 
+if not __package__:  # run as a script: only this folder is on the path
+    sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
 from replay.cli import main as replay
 from scripts.browser import browser, missing, picture, show
 

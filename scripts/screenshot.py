@@ -26,7 +26,7 @@ from PIL import Image
 from rerun.experimental import ViewerClient
 
 from replay.sinks.rerun_stream import ELAPSED
-from replay.viewer import environment, live_address, program
+from replay.viewer import RRD_MAGIC, environment, live_address, program
 
 _START_S = 30.0
 _NOTICES_S = 5.0
@@ -152,6 +152,9 @@ def main() -> int:
     arguments = parser.parse_args()
     if not arguments.recording.is_file():
         parser.error(f"{arguments.recording}: there is no such file")
+    with arguments.recording.open("rb") as file:
+        if file.read(len(RRD_MAGIC)) != RRD_MAGIC:
+            parser.error(f"{arguments.recording}: this is no Rerun recording")
     times, names = arguments.at or [None], arguments.tab or [None]
     try:
         found = taken(arguments.recording, arguments.picture, times, names, arguments.size)

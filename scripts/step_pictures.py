@@ -11,7 +11,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from rosbags.highlevel import AnyReader
+from rosbags.highlevel import AnyReader, AnyReaderError
 
 from replay.topics import IMAGE_TOPICS
 
@@ -24,20 +24,31 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--prefix", default="", help="what the files' names begin with")
     arguments = parser.parse_args()
-    last: dict[str, np.ndarray] = {}
-    topics = f"{IMAGE_TOPICS}/{arguments.robot}/"
-    with AnyReader([arguments.mcap]) as reader:
-        wanted = [item for item in reader.connections if item.topic.startswith(topics)]
-        for connection, _, data in reader.messages(wanted):
-            message = reader.deserialize(data, connection.msgtype)
-            pixels = np.asarray(message.data).reshape(message.height, message.width, 3)
-            last[connection.topic.removeprefix(topics)] = pixels
-    if not last:
+    if not arguments.mcap.exists():
+        parser.error(f"{arguments.mcap}: it does not exist")
+    try:
+        found = pictures(arguments.mcap, f"{IMAGE_TOPICS}/{arguments.robot}/")
+        arguments.folder.mkdir(parents=True, exist_ok=True)
+    except (AnyReaderError, OSError) as error:
+        parser.error(f"{arguments.mcap}: {' '.join(str(error).split())}")
+    if not found:
         parser.error(f"{arguments.mcap}: there are no pictures of {arguments.robot}")
-    for step, pixels in last.items():
+    for step, pixels in found.items():
         path = arguments.folder / f"{arguments.prefix}{step}.png"
         cv2.imwrite(str(path), cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 9])
     return 0
+
+
+def pictures(mcap: Path, topics: str) -> dict[str, np.ndarray]:
+    """Return the last picture of each topic below some name, by the rest of its name."""
+    last: dict[str, np.ndarray] = {}
+    with AnyReader([mcap]) as reader:
+        wanted = [item for item in reader.connections if item.topic.startswith(topics)]
+        for connection, _, data in reader.messages(wanted) if wanted else ():  # of no connections it reads all
+            message = reader.deserialize(data, connection.msgtype)
+            pixels = np.asarray(message.data).reshape(message.height, message.width, 3)
+            last[connection.topic.removeprefix(topics)] = pixels
+    return last
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from benchmarks.faults.pool import Done, Worker, run_all
 from benchmarks.faults.printed import Counts
 from benchmarks.faults.table import FAULTS
 from benchmarks.faults.whole_runs import tried
+from benchmarks.flags import count, count_or_none, folder, size
 
 TRIES = 10_000
 WHOLE_RUNS = "whole runs"
@@ -110,14 +111,16 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.faults", description="What becomes of damaged, hostile and unlucky input."
     )
-    parser.add_argument("--tries", type=int, default=TRIES, help="how many variants; %(default)s by default")
-    parser.add_argument("--seconds", type=float, help="begin nothing new after so long")
+    parser.add_argument("--tries", type=count, default=TRIES, help="how many variants; %(default)s by default")
+    parser.add_argument("--seconds", type=size, help="begin nothing new after so long")
     parser.add_argument("--seed", type=int, default=0, help="the same variants for the same seed")
     parser.add_argument("--formats", nargs="+", choices=tuple(FORMATS), default=tuple(FORMATS), metavar="FORMAT")
     parser.add_argument("--faults", nargs="+", choices=tuple(FAULTS), default=tuple(FAULTS), metavar="FAULT")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="how many processes work at once")
-    parser.add_argument("--runs", type=int, default=0, help="how often whole runs are killed, starved and so on")
-    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="folder for variants that failed")
+    parser.add_argument("--jobs", type=count, default=os.cpu_count() or 1, help="how many processes work at once")
+    parser.add_argument(
+        "--runs", type=count_or_none, default=0, help="how often whole runs are killed, starved and so on"
+    )
+    parser.add_argument("--keep", type=folder, metavar="FOLDER", help="folder for variants that failed")
     parser.add_argument("--by-format", action="store_true", help="print a table of formats as well")
     parser.add_argument("--replay", metavar="CASE", help="try one again, such as mcap_zstd/truncated/17")
     return parser

@@ -23,7 +23,7 @@ from replay.sinks.partial_file import partial_name
 from replay.sinks.publication import aside_name
 
 SAMPLE = Path(__file__).resolve().parents[2] / "samples" / "two_robots.mcap"
-FINALS = ("out.mcap", "out.rrd", "out.json")
+FINALS = ("out.mcap", "out.rrd", "out.html", "out.json")
 
 _POLL_S = 0.005
 _PATIENCE_S = 300.0
@@ -113,7 +113,7 @@ class _Trial:
         left = tuple(sorted(each.name for each in out.iterdir()))
         broken = list(self._broken(out, left))
         recovered = self._recovered(out, broken)
-        broken += self._broken_later(out)
+        broken += self._broken_later(out, with_page=not replaces)
         return Outcome(replaces, killed, left, recovered, tuple(broken))
 
     def _broken(self, out: Path, left: tuple[str, ...]) -> Iterator[str]:
@@ -158,20 +158,22 @@ class _Trial:
             broken.append("what was recovered is not what was written")
         return count
 
-    def _broken_later(self, out: Path) -> Iterator[str]:
+    def _broken_later(self, out: Path, *, with_page: bool) -> Iterator[str]:
         """Yield what is wrong with a run that follows."""
-        if _started(self.run, out, "--force", "--no-rrd").wait(_PATIENCE_S):
+        if _started(self.run, out, "--force", "--no-rrd", with_page=with_page).wait(_PATIENCE_S):
             yield "a run that follows fails"
             return
-        if (left := sorted(each.name for each in out.iterdir())) != ["out.json", "out.mcap"]:
+        names = [*(["out.html"] if with_page else []), "out.json", "out.mcap"]
+        if (left := sorted(each.name for each in out.iterdir())) != names:
             yield f"a run that follows leaves {', '.join(left)}"
-        for name in ("out.json", "out.mcap"):
+        for name in set(names) & set(left):
             if (out / name).read_bytes() != (self.whole / name).read_bytes():
                 yield f"a run that follows writes another {name}"
 
 
-def _started(run: Path, out: Path, *flags: str) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "replay.cli", "merge", str(run), "-o", str(out / "out.mcap"), *flags]
+def _started(run: Path, out: Path, *flags: str, with_page: bool = True) -> subprocess.Popen[bytes]:
+    page = ["--report", str(out / "out.html")] if with_page else []
+    command = [sys.executable, "-m", "replay.cli", "merge", str(run), "-o", str(out / "out.mcap"), *page, *flags]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from benchmarks.data import data_folder
+from benchmarks.flags import count, folder, share
 from benchmarks.speed import cold, growth, memory, pairs, replays, startup, warm
 from benchmarks.speed.options import Options
 from benchmarks.speed.timing import one_thread
@@ -29,8 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Print the sections that were asked for."""
     given = vars(_parser().parse_args(arguments))
     sections, work = given.pop("sections"), given.pop("work")
-    folder = data_folder()
-    recordings = None if folder is None else folder / "real"
+    data = data_folder()
+    recordings = None if data is None else data / "real"
     if recordings is None and "replay" in sections:
         print("recordings: not measured, for they are absent; set REPLAY_DATA to their folder", file=sys.stderr)
     with one_thread(), TemporaryDirectory() as temporary:
@@ -51,7 +52,7 @@ def show(sections: Sequence[str], options: Options) -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description="How long things take, against simpler work on the same data.")
     parser.add_argument("--sections", nargs="+", choices=tuple(SECTIONS), default=tuple(SECTIONS))
-    parser.add_argument("--work", type=Path, help="folder that keeps the recordings that are made; none by default")
+    parser.add_argument("--work", type=folder, help="folder that keeps the recordings that are made; none by default")
     parser.add_argument("--huge", action="store_true", help="memory: also maps of 10 000 × 10 000 cells")
     told = {
         "sides": "cold: cells a side",
@@ -76,26 +77,12 @@ def _parser() -> argparse.ArgumentParser:
 def _add(parser: argparse.ArgumentParser, name: str, default: object, text: str) -> None:
     """Add a flag for a number or for several, as the default is."""
     several = isinstance(default, tuple)
-    kind = _share if isinstance(default, float) else _count
+    kind = share if isinstance(default, float) else count
     flag = f"--{name.replace('_', '-')}"
     if several:
         parser.add_argument(flag, type=kind, nargs="+", default=default, help=text)
     else:
         parser.add_argument(flag, type=kind, default=default, help=text)
-
-
-def _count(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text}: expected 1 or more")
-    return number
-
-
-def _share(text: str) -> float:
-    number = float(text)
-    if not 0.0 < number <= 1.0:
-        raise argparse.ArgumentTypeError(f"{text}: expected more than 0, and 1 at most")
-    return number
 
 
 if __name__ == "__main__":

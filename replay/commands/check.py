@@ -162,7 +162,7 @@ def _merged(options: argparse.Namespace) -> Report:
 
     written = _written(options)
     if written is None:
-        options.images = "none"
+        options.images = options.trajectories = "none"
     run_options = inputs.run_options(options)
     merging = Run(run_options, written, talk.of(options), options.color, is_shown=options.view)
     options.is_published = lambda: written is not None and merging.narrator.is_published

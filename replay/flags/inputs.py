@@ -11,7 +11,7 @@ from replay.flags import placing, rules
 from replay.flags.values import read_flag
 
 if TYPE_CHECKING:
-    from replay.options import RunOptions
+    from replay.options import RunOptions, TrajectoryChoice
 
 
 def add(parser: argparse.ArgumentParser, *config_names: str) -> None:
@@ -111,11 +111,16 @@ def run_options(options: argparse.Namespace, *, needs_runs: bool = True) -> RunO
         max_memory_bytes=(
             read_flag("--max-memory", options.max_memory, size_to_bytes) if options.max_memory is not None else None
         ),
-        # for outputs that show them
-        trajectories="none" if getattr(options, "no_rrd", True) else getattr(options, "trajectories", "none"),
+        trajectories=_trajectories(options),
         jobs=rules.jobs(options.jobs) if hasattr(options, "jobs") else 1,
         **placed,
     )
+
+
+def _trajectories(options: argparse.Namespace) -> TrajectoryChoice:
+    """Return of which recordings it is read where robots drove: of none where no output shows it."""
+    is_shown = not getattr(options, "no_rrd", True) or getattr(options, "report", None) is not None
+    return getattr(options, "trajectories", "none") if is_shown else "none"
 
 
 def refuse_no_runs(options: argparse.Namespace) -> None:

@@ -51,9 +51,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--trajectories",
         choices=("none", "auto", "all"),
         default="auto",
-        help="read from /tf where robots drove, to show it in the Rerun recording: of no recording, of those of up to "
-        "64 MiB and 20 000 messages of transforms that are not compressed as files, or of all, however long that takes "
-        "(default: %(default)s)",
+        help="read from /tf where robots drove, to show it in the Rerun recording and on the page: of no recording, of "
+        "those of up to 64 MiB and 20 000 messages of transforms that are not compressed as files, or of all, however "
+        "long that takes (default: %(default)s)",
     )
     outputs.add_argument("--json", action="store_true", help="print the report instead of a table")
 

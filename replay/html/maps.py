@@ -1,4 +1,4 @@
-"""The merged map, each robot's walls on it, and the maps that are not merged."""
+"""The merged map, each robot's walls and way on it, and the maps that are not merged."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from mapmerge.warp import Layer
 from replay.html.pictures import Picture, grey_picture, mask_picture, single_picture, tint_picture, visible
 from replay.html.roster import Member
 from replay.html.story import MAX_SIDE_PX, Story
+from replay.html.ways import Ways, ways
 
 _OWN_SIDE_PX = 800
 
@@ -29,9 +30,10 @@ class MapLayer:
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """Pictures of the same place on each other."""
+    """Pictures of the same place on each other, and where robots drove there, if that is known."""
 
     layers: tuple[MapLayer, ...]
+    ways: Ways | None
     resolution_m: float
 
     @property
@@ -74,7 +76,8 @@ def merged_stack(story: Story) -> Stack | None:
         found = compared_on([layer for _, layer in placed], pixels, story.cells, story.tolerance_m)
         tint = tint_picture(found, np.logical_or.reduce([shown.walls for shown in maps]), pixels)
         layers.append(MapLayer("where maps overlap", tint, None, shown=False, kind="tint"))
-    return Stack(tuple(layers), result.merged.resolution_m)
+    driven = ways(story, [(member, layer.merged_from_map) for member, layer in placed], pixels)
+    return Stack(tuple(layers), driven, result.merged.resolution_m)
 
 
 def apart(story: Story) -> list[Apart]:

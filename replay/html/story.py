@@ -6,8 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
+from mapmerge.outcome import ChangeKind
 from mapmerge.raster import shrunk
 from mapmerge.result import MergeResult
 from mapmerge.sim2 import Sim2
@@ -53,6 +57,11 @@ class Story:
         What was decided, in order, and of how much more in the middle nothing is kept.
     first_ns, last_ns
         Times of the first and the last tick; 0 without one.
+    ways
+        Where robots drove, in order of time, in their map frames as these are in the end: shape (N, 2), at least one
+        point, in metres. Of those of whom that is known.
+    are_ways_whole
+        Whether all that was recorded of it could be read.
     """
 
     robots: tuple[RobotInput, ...]
@@ -64,6 +73,8 @@ class Story:
     decisions_left_out: int
     first_ns: int
     last_ns: int
+    ways: Mapping[str, NDArray[np.float64]]
+    are_ways_whole: bool
     _shown: dict[str, Grid] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -97,7 +108,7 @@ class Story:
 
 
 class StoryTeller:
-    """Folds events; what it keeps of a tick are numbers and words, but for the last one."""
+    """Folds events; what it keeps of a tick are numbers, words and where robots drove, but for the last one."""
 
     def __init__(self) -> None:
         self._robots: tuple[RobotInput, ...] = ()
@@ -107,6 +118,8 @@ class StoryTeller:
         self._left_out = 0
         self._result: MergeResult | None = None
         self._span_ns: tuple[int, int] | None = None
+        self._ways: dict[str, list[NDArray[np.float64]]] = {}
+        self._are_ways_whole = True
 
     def take(self, event: Event) -> Story | None:
         """Take in an event; the last one makes the story whole."""
@@ -126,6 +139,17 @@ class StoryTeller:
         self._series.take(stamp_ns, event.report["robots"])
         for change, (_, words) in zip(event.result.changes, decisions(event.result), strict=True):
             self._keep(Decision(stamp_ns, change.robot, str(change.kind), words))
+        self._drive(event)
+
+    def _drive(self, event: Merged) -> None:
+        """Keep where robots drove; of one whose map jumped, what follows: what was before is of another frame."""
+        jumped = {change.robot for change in event.result.changes if change.kind is ChangeKind.JUMPED}
+        for robot in jumped:
+            self._ways.pop(robot, None)
+        for item in event.moved:
+            if item.robot not in jumped:
+                self._ways.setdefault(item.robot, []).append(item.poses[:, :2])
+        self._are_ways_whole = self._are_ways_whole and not event.remarks
 
     def _keep(self, decision: Decision) -> None:
         if len(self._first) < MOST_DECISIONS:
@@ -148,4 +172,6 @@ class StoryTeller:
             self._left_out,
             first_ns,
             last_ns,
+            {robot: np.concatenate(parts) for robot, parts in self._ways.items()},
+            self._are_ways_whole,
         )

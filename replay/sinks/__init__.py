@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
-from replay.errors import UsageError
-from replay.html.own_page import is_own_page
+from replay.errors import OutputError, UsageError
+from replay.html.own_page import is_begun_page, is_own_page
 from replay.interrupts import held_off
 from replay.options import OutputOptions
 from replay.sinks.base import Sink
@@ -93,6 +93,7 @@ def open_sinks(
             claim(file, say)
         unwritten = [PartialFile(options.mcap.with_suffix(".rrd"))] if not options.rrd else []
         remove_left_over([*unwritten, PartialFile(options.mcap, recovering_name(options.mcap))], say)
+        _remove_begun_page(options, say)
         refuse_existing(options)  # once more: another run may have published between the first time and the claim
         for name, file in files.items():
             module, _, attribute = SINKS[name].partition(":")
@@ -128,3 +129,14 @@ def remove_left_over(unwritten: Iterable[PartialFile], say: Callable[[str], obje
         if file.partial.exists():
             claim(file, say)
             file.discard()
+
+
+def _remove_begun_page(options: OutputOptions, say: Callable[[str], object]) -> None:
+    """Remove what an earlier run left of a page beside the MCAP, if this one writes none there.
+
+    Another run may be writing a page of that name: it is no part of what this one writes, and stays.
+    """
+    page = PartialFile(options.mcap.with_suffix(".html"))
+    if page.path != options.html and is_begun_page(page.partial):
+        with suppress(OutputError):
+            remove_left_over([page], say)

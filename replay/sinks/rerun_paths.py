@@ -13,12 +13,12 @@ from replay.events import Moved
 from replay.palette import Rgb
 from replay.sinks.rerun_entities import RobotEntities
 from replay.sinks.rerun_stream import RrdStream
+from replay.tracker import JUMP_M
 
 PIECE_POSES = 256
 """Of a longer line only the last piece is logged again, so that what is written grows as the line does."""
 
 _HEIGHT_M = 0.35
-_JUMP_M = 3.0
 _ARROW_M = 0.8
 _LINE_RADIUS = rr.Radius.ui_points(0.7)
 _DOT_RADIUS = rr.Radius.ui_points(5.0)
@@ -36,7 +36,7 @@ class _Line:
     waiting: list[Moved] = field(default_factory=list)
 
     def add(self, place: _Place) -> None:
-        if self.strips and math.dist(self.strips[-1][-1], place) <= _JUMP_M:
+        if self.strips and math.dist(self.strips[-1][-1], place) <= JUMP_M:
             self.strips[-1].append(place)
         else:
             self.strips.append([place])

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.faults.kills import killed_runs
+from replay.sinks.partial_file import PartialFile
 from tests.bags import write_mcap
 from tests.outputs import raw, summary
 from tests.program import PROGRAM, Program, quiet, started, wait_for
@@ -63,6 +64,7 @@ def test_at_random_moments(tmp_path: Path) -> None:
     assert [outcome for outcome in outcomes if outcome.broken] == []
     assert any(outcome.killed for outcome in outcomes)
     assert any("out.mcap.partial" in outcome.left for outcome in outcomes)
+    assert any("out.html" in outcome.left for outcome in outcomes)
 
 
 @pytest.mark.parametrize("rrd", [True, False])
@@ -120,6 +122,29 @@ class TestWhatIsLeft:
         for name in ("out.mcap", "out.json"):
             assert f"an earlier run was cut off and left {left / name}.partial; it is removed" in ran.err
         assert {each.name for each in left.iterdir()} == {"out.mcap", "out.json"}
+
+    def test_of_a_page_is_removed_by_a_run_that_writes_none(self, replay: Program, two: Path, tmp_path: Path) -> None:
+        page = tmp_path / "out.html.partial"
+        assert replay("merge", two, "-o", "a.mcap", "--no-rrd", "--images", "none", "--report", page.stem).status == 0
+        (tmp_path / "out.html").rename(page)
+        ran = replay("merge", two, "-o", "out.mcap", "--no-rrd", "--images", "none")
+        assert ran.status == 0
+        assert f"an earlier run was cut off and left {page.name}; it is removed" in ran.err
+        page.touch()
+        ran = replay("merge", two, "-o", "out.mcap", "--no-rrd", "--images", "none", "--force")
+        assert ran.status == 0
+        assert "earlier run" not in ran.err
+        assert not page.exists()
+
+    def test_of_a_page_stays_if_it_is_somebody_elses(self, replay: Program, two: Path, tmp_path: Path) -> None:
+        page = tmp_path / "out.html.partial"
+        page.write_text("dear to somebody")
+        assert replay.merge(two).status == 0
+        assert page.read_text() == "dear to somebody"
+        page.unlink()
+        with PartialFile.claimed(tmp_path / "out.html").stream():  # another run writes it now
+            assert replay("merge", two, "-o", "out.mcap", "--no-rrd", "--images", "none", "--force").status == 0
+            assert page.exists()
 
     def test_goes_unmentioned_where_it_is_empty(self, replay: Program, two: Path, tmp_path: Path) -> None:
         (tmp_path / "out.mcap.partial").touch()

@@ -116,7 +116,9 @@ def test_it_fits_any_window(chrome: Chrome, pages: dict[str, Path], name: str, w
     assert chrome.execute_script(f"return {box}.scrollWidth - {box}.clientWidth") <= 0
 
 
-@pytest.mark.parametrize("name", ["three_robots_one_unplaced", "restarted", "no_reference", "believed", "many_robots"])
+@pytest.mark.parametrize(
+    "name", ["three_robots_one_unplaced", "restarted", "no_reference", "believed", "driven", "many_robots"]
+)
 @pytest.mark.parametrize("width", [DESK, PHONE], ids=["desk", "phone"])
 def test_it_is_accessible_to_all(chrome: Chrome, pages: dict[str, Path], name: str, width: int) -> None:
     open_page(chrome, pages[name], width)
@@ -268,6 +270,33 @@ def test_the_map_is_zoomed_by_wheel_only_when_it_is_meant(chrome: Chrome, pages:
     ActionChains(chrome).click(stage).perform()
     ActionChains(chrome).scroll_from_origin(origin, 0, -200).perform()
     WebDriverWait(chrome, 10).until(lambda _: chrome.execute_script(zoomed))
+
+
+def test_ways_are_switched_and_stay_thin(chrome: Chrome, pages: dict[str, Path]) -> None:
+    open_page(chrome, pages["driven"])
+    script = "return getComputedStyle(document.querySelector('.ways .way:not(.edge)')).strokeWidth"
+    thin_px = float(chrome.execute_script(script).removesuffix("px"))
+    chrome.execute_script("document.querySelector('#merged [data-zoom=in]').click()")
+    assert float(chrome.execute_script(script).removesuffix("px")) == pytest.approx(thin_px / 1.5, rel=0.01)
+    shown = "return document.querySelector('.ways').getClientRects().length"
+    assert chrome.execute_script(shown) == 1
+    chrome.execute_script("document.querySelector('input[data-layer=ways]').click()")
+    assert chrome.execute_script(shown) == 0
+
+
+def test_what_is_shown_is_in_the_legend_of_a_print(chrome: Chrome, pages: dict[str, Path]) -> None:
+    open_page(chrome, pages["driven"])
+    labels = """return [...document.querySelectorAll('.layers label, #merged .legend')]
+        .filter((each) => each.getClientRects().length).map((each) => each.textContent.trim().split(':')[0])"""
+    always = ["merged map", "walls of r1", "walls of r2"]
+    chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        assert chrome.execute_script(labels) == [*always, "where robots drove"]
+        for layer in ("ways", "3"):
+            chrome.execute_script(f"document.querySelector('input[data-layer=\"{layer}\"]').click()")
+        assert chrome.execute_script(labels) == [*always, "where maps overlap", "Where maps overlap"]
+    finally:
+        chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
 
 
 def test_it_is_read_without_scripts(chrome: Chrome, pages: dict[str, Path]) -> None:

@@ -111,6 +111,10 @@ def test_layers_of_the_map_are_those_of_the_placed_robots() -> None:
     labels = ["".join(each.itertext()).strip() for each in found.section("map").iter("label")]
     assert labels == ["merged map", "walls of r1", "walls of r2", "where maps overlap"]
     assert "r3 not placed on r1" in found.words("map").partition("Not in the merged map")[2]
+    driven = Page(page_of("driven"))
+    labels = ["".join(each.itertext()).strip() for each in driven.section("map").iter("label")]
+    assert labels[-2:] == ["where maps overlap", "where robots drove"]
+    assert "where robots drove, as far as that is known: r1; a dot is where one was last." in driven.words("map")
 
 
 def test_what_was_lost_is_named() -> None:

@@ -27,6 +27,7 @@ from replay.thinned_transforms import Thinned
 from replay.tracker import MOST_POSES, STEP_M, Tracker
 from replay.trajectories import AUTO_BYTES
 from tests.bags import SECOND, Recorded, write_mcap, write_rosbag1, write_rosbag2
+from tests.pages import Page
 from tests.program import Program
 from tests.rrd import contents
 from tests.runs import growing, in_log_order, link, linked, two_robots
@@ -160,14 +161,64 @@ def test_one_recording_that_cannot_be_read_on_is_one_remark(
     for choice in ("none", "all"):
         output = tmp_path / choice / "out.mcap"
         output.parent.mkdir()
-        done = program("merge", *paths, "-o", output, "--images", "none", "--trajectories", choice, "-v", "--strict")
+        outs = ("-o", output, "--report", output.with_suffix(".html"))
+        done = program("merge", *paths, *outs, "--images", "none", "--trajectories", choice, "-v", "--strict")
         assert done.status == 0
         assert done.err.count(said) == (choice == "all")
         rows = str([each for each in contents(output.with_suffix(".rrd")) if each[0] == "/decisions"])
         assert rows.count(said) == (choice == "all")
+        page = Page.read(output.with_suffix(".html"))
+        assert ("A recording could not be read to the end for them." in page.words("map")) == (choice == "all")
         outputs[choice] = [output.with_suffix(suffix).read_bytes() for suffix in (".mcap", ".json")]
     assert outputs["none"] == outputs["all"]
     assert said not in program("merge", *paths, "-o", tmp_path / "usual.mcap", "--trajectories", "all").err
+
+
+def test_the_page_shows_them_and_the_record_does_not_tell(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Also where no Rerun recording is written; and nothing is read where nothing shows it."""
+    path, outputs = write_mcap(tmp_path / "run.mcap", recorded()), {}
+    for choice in ("none", "auto", "all"):
+        folder = tmp_path / choice
+        folder.mkdir()
+        flags = ("-o", folder / "out.mcap", "--no-rrd", "--report", folder / "out.html", "--images", "none")
+        assert Program(capsys, tmp_path)("merge", path, *flags, "--trajectories", choice).status == 0
+        outputs[choice] = {kind: (folder / f"out.{kind}").read_bytes() for kind in ("mcap", "json", "html")}
+    for kind in ("mcap", "json"):
+        assert outputs["none"][kind] == outputs["auto"][kind] == outputs["all"][kind]
+    assert outputs["auto"]["html"] == outputs["all"]["html"]
+    assert b'aria-label="Where r1, r2 drove"' in outputs["auto"]["html"]
+    assert b"drove" not in Page(outputs["none"]["html"].decode()).words().encode()
+
+
+@pytest.mark.parametrize(
+    ("flags", "is_read"),
+    [
+        (("merge", "-o", "out.mcap"), True),
+        (("merge", "-o", "out.mcap", "--no-rrd", "--report", "out.html"), True),
+        (("merge", "-o", "out.mcap", "--no-rrd"), False),
+        (("check", "--write-expect", "expect.yaml"), False),
+        (("check", "--write-expect", "expect.yaml", "-o", "out.mcap"), True),
+    ],
+)
+def test_it_is_read_where_an_output_shows_it(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    flags: Sequence[str],
+    is_read: bool,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path, asked = write_mcap(tmp_path / "run.mcap", recorded()), []
+    wanted = trajectories.Trajectories._wanted
+
+    def noticed(self: trajectories.Trajectories) -> list[int]:
+        asked.append(wanted(self))
+        return asked[-1]
+
+    monkeypatch.setattr(trajectories.Trajectories, "_wanted", noticed)
+    command, *rest = flags
+    assert Program(capsys, tmp_path)(command, path, *rest).status == 0
+    assert asked == [[0] if is_read else []]
 
 
 def same(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> bool:

@@ -42,6 +42,7 @@
       this.x = clamp(this.x, width * (1 - this.scale), 0);
       this.y = clamp(this.y, height * (1 - this.scale), 0);
       this.sheet.style.transform = `translate(${this.x}px, ${this.y}px) scale(${this.scale})`;
+      this.sheet.style.setProperty("--zoom", this.scale);
       this.stage.classList.toggle("zoomed", this.scale > 1);
       const cols = Number(getComputedStyle(this.stage).getPropertyValue("--cols"));
       this.stage.classList.toggle("close-up", width * this.scale > 1.5 * cols);
@@ -108,8 +109,8 @@
   for (const root of all("main .viewer")) {
     new Viewer(root);
     for (const box of all("input[data-layer]", root)) {
-      const image = root.querySelector(`img[data-layer="${box.dataset.layer}"]`);
-      const follow = () => { image.hidden = !box.checked; };
+      const layer = root.querySelector(`.sheet [data-layer="${box.dataset.layer}"]`);
+      const follow = () => { layer.toggleAttribute("hidden", !box.checked); };
       box.addEventListener("change", follow);
       follow();
     }
