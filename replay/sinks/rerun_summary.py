@@ -39,12 +39,36 @@ class Said:
         return f"+{self.since_s:.1f} s"
 
 
+class Setbacks:
+    """Whose map jumped or was withdrawn: the first ones in words, and how many there were."""
+
+    def __init__(self) -> None:
+        self.first: list[str] = []
+        self.count = 0
+
+    def take(self, report: Report) -> None:
+        """Take in what changed at a time, as the report of that time says."""
+        for item in report["history"]:
+            if item["event"] in _EVENTS:
+                self.count += 1
+                if len(self.first) < _MOST_WRONG:
+                    what = _EVENTS[item["event"]].format(_bold(item["robot"]))
+                    self.first.append(f"{what}: {paragraph(item['reason']['message'])}")
+
+
 def legend(*, has_ways: bool) -> str:
     """Return how to read the map, in Markdown; with ``has_ways``, where robots drove is on it."""
     return _LEGEND.format(ways=", and **thin lines** show where it drove" if has_ways else "")
 
 
-def summary(report: Report, robots: Sequence[RobotEntities], said: Sequence[Said], *, is_last: bool = False) -> str:
+def summary(
+    report: Report,
+    robots: Sequence[RobotEntities],
+    said: Sequence[Said],
+    setbacks: Setbacks,
+    *,
+    is_last: bool = False,
+) -> str:
     """Return the page as of now, in Markdown.
 
     It does not say when that is, which the time line shows: so it stays the same while nothing happens.
@@ -57,6 +81,8 @@ def summary(report: Report, robots: Sequence[RobotEntities], said: Sequence[Said
         The robots, the reference first.
     said
         The log so far.
+    setbacks
+        What jumped or was withdrawn so far.
     is_last
         Whether the run has ended: before that, a map that is not merged may be yet.
     """
@@ -69,7 +95,7 @@ def summary(report: Report, robots: Sequence[RobotEntities], said: Sequence[Said
         "Nothing: no map was refused, nothing was skipped." if is_last else "All maps are, and nothing was skipped."
     )
     heading = "What went wrong" if is_last else "Not merged yet, or skipped"
-    parts += [f"### {heading}", *_items(_wrong(report, is_last=is_last), nothing)]
+    parts += [f"### {heading}", *_items(_wrong(report, setbacks, is_last=is_last), nothing)]
     parts += ["### Decisions", *_items(_lately(said), "None yet.")]
     return "\n\n".join(parts) + "\n"
 
@@ -102,7 +128,7 @@ def _overlap(values: Mapping[str, Any]) -> str:
     return NO_FIGURE if values["overlap_m2"] is None else area(values["overlap_m2"])
 
 
-def _wrong(report: Report, *, is_last: bool) -> list[str]:
+def _wrong(report: Report, setbacks: Setbacks, *, is_last: bool) -> list[str]:
     """Say which robots are not merged and why, what jumped or was withdrawn, and how much was skipped."""
     found = [
         f"**{cell(robot)}** is not merged: {_reason(values['reason'], is_last=is_last)}"
@@ -112,13 +138,10 @@ def _wrong(report: Report, *, is_last: bool) -> list[str]:
     if skipped := sum(report["skipped"].values()):
         causes = ", ".join(f"{count} {cell(cause)}" for cause, count in report["skipped"].items())
         found.append(f"{counted(skipped, 'message')} skipped: {causes}; see *Decisions*")
-    found += [
-        f"{_EVENTS[item['event']].format(_bold(item['robot']))}: {paragraph(item['reason']['message'])}"
-        for item in report["history"]
-        if item["event"] in _EVENTS
-    ]
-    if len(found) > _MOST_WRONG:
-        found = [*found[:_MOST_WRONG], f"and {len(found) - _MOST_WRONG} more: see *Decisions*"]
+    more = len(found) + setbacks.count - _MOST_WRONG
+    found = [*found, *setbacks.first][:_MOST_WRONG]
+    if more > 0:
+        found.append(f"and {more} more: see *Decisions*")
     return found
 
 

@@ -78,7 +78,8 @@ def events_of(
         written = report.build(stamp_ns, result, ({"name": "run.mcap"},))
         found.append(Merged(stamp_ns, result, written, gallery.due(result), Timing(0.1, 0.2), 1, 9))
     last_ns = max(ticks, default=None)
-    return [*found, Finished(report.build(last_ns, merger.result, ({"name": "run.mcap", "sha256": "ab"},)))]
+    final = report.build(last_ns, merger.result, ({"name": "run.mcap", "sha256": "ab"},), is_last=True)
+    return [*found, Finished(final)]
 
 
 @pytest.fixture(scope="module")
@@ -309,6 +310,16 @@ def test_the_table_has_every_robot(recording: Path) -> None:
     assert set(rule) == {"---"}
     assert [row[0] for row in rows] == list(ROBOTS)
     assert [row[1] for row in rows] == ["reference", "merged", "unmerged", "no\\_map"]
+
+
+def test_the_summary_says_the_first_setbacks_and_how_many_more(tmp_path: Path) -> None:
+    maps = [{"r2": bare_room() if index % 2 else flat_map("r2")} for index in range(11)]
+    events = events_of(("r1", "r2"), dict(enumerate([{"r1": flat_map("r1")}, *maps])))
+    pages = Entity(written(tmp_path / "run.rrd", events), "/summary").values("TextDocument:text")
+    wrong = pages[-1].partition("went wrong")[2].partition("### Decisions")[0].strip().splitlines()
+    told = ["- the map of **r2** jumped in its own frame", "- **r2** was withdrawn for some time"]
+    assert [line.partition(":")[0] for line in wrong] == [*told, *told, *told, "- and 4 more"]
+    assert "jumped" not in pages[1]
 
 
 def test_about_holds_inputs_and_settings(recording: Path) -> None:
