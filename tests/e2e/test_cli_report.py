@@ -186,6 +186,10 @@ def test_a_topic_is_only_ever_text(replay: Program, tmp_path: Path, name: str) -
             "--set",
             "merge.refine.reject_m=[0.4, 0.2]",
         ),
+        ("bot=samples/bag_per_robot/alpha",),
+        ("a=samples/bag_per_robot/alpha", "samples/two_robots.mcap", "--align-starts"),
+        ("samples/bag_per_robot/bravo", "samples/bag_per_robot/alpha"),
+        ("b=samples/bag_per_robot/bravo", "samples/bag_per_robot/alpha", "--robots", "alpha,b"),
         ("samples/two_robots.mcap", "--every", "2.5", "--copy-maps", "--stop", "40"),
         ("samples/two_robots.mcap", "--clock", "log", "--reorder-window", "0.25", "--max-memory", "300MB"),
         ("samples/two_robots.mcap", "--init-pose", "r2=1,2,30deg+-5,+-5,+-90deg", "--align-starts", "--stop", "40"),
@@ -212,7 +216,11 @@ def test_the_command_that_it_names_gives_the_same_again(
     assert replay("merge", *arguments, "-o", one, "--no-rrd", "--report", page, *QUIET).status == 0
     program, *command = shlex.split(Page.read(page).command)
     assert program == "replay"
-    monkeypatch.chdir(ROOT / "samples/bag_per_robot" if "alpha=" in arguments[0] else ROOT / "samples")
+    # as in one folder with all of them
+    for path in (ROOT / "samples" / "two_robots.mcap", *(ROOT / "samples/bag_per_robot").iterdir()):
+        (tmp_path / path.name).symlink_to(path)
+    (tmp_path / "three_robots.bag").symlink_to(ROOT / "samples" / "three_robots.bag")
+    monkeypatch.chdir(tmp_path)
     assert replay(*command, "-o", again, "--no-rrd").status == 0
     before, after = (json.loads(path.with_suffix(".json").read_text()) for path in (one, again))
     assert before == after

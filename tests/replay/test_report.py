@@ -30,6 +30,7 @@ INPUT: Mapping[str, Any] = {
     "name": "run.mcap",
     "format": "mcap",
     "size_bytes": 5,
+    "said_of": None,
     "robots": list(ROBOTS),
     "clocks": dict.fromkeys(ROBOTS, "header"),
     "offsets_ns": dict.fromkeys(ROBOTS, 0),
