@@ -32,7 +32,6 @@ def page(story: Story) -> str:
         script_hash=_hash(script),
         verdict=verdict.verdict(story),
         key_figures=list(_key_figures(story)),
-        members=list(story.roster.values()),
         robots=robots.rows(story),
         is_scaled=story.settings["merge"]["scale"] == "free",
         stack=maps.merged_stack(story),

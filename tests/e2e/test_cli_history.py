@@ -6,19 +6,17 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from mcap.writer import Writer
 
 import replay as library
-from mapmerge.grid import Grid
 from replay import report_file
 from replay.errors import InputError
 from replay.options import TimeBound
 from tests.bags import NO_INDEX, write_mcap
 from tests.outputs import reports
 from tests.program import Program, Ran
-from tests.runs import at, seen
+from tests.runs import at, forgetting
 
 TICKS = 60
 
@@ -26,8 +24,7 @@ TICKS = 60
 @pytest.fixture
 def jumping(replay: Program, tmp_path: Path) -> Ran:
     """A run of one robot whose map forgets at each time what it knew."""
-    recorded = [seen("r1", index, one_half(is_left=bool(index % 2))) for index in range(TICKS)]
-    return replay.merge(write_mcap(tmp_path / "run.mcap", recorded))
+    return replay.merge(write_mcap(tmp_path / "run.mcap", forgetting("r1", TICKS)))
 
 
 def test_reports_do_not_grow_with_the_time(jumping: Ran) -> None:
@@ -74,12 +71,6 @@ def test_a_run_that_did_not_end_has_its_history_by_parts(jumping: Ran, tmp_path:
         assert report["stamp_ns"] == at(last)
         assert report["history"] == jumping.report["history"][last - 1 : last]
         assert report["history_before"] == last - 1
-
-
-def one_half(*, is_left: bool) -> Grid:
-    cells = np.full((40, 60), -1, np.int8)
-    cells[5:35, slice(2, 28) if is_left else slice(32, 58)] = 0
-    return Grid(cells, 0.1)
 
 
 def copied(path: Path, to: Path, most: int | None = None, **options: Any) -> Path:
