@@ -11,8 +11,8 @@ from mapmerge.reasons import ReasonCode
 from replay.advice import ADVICE
 from replay.events import Report
 from replay.figures import NO_FIGURE, area, percent, share
+from replay.markdown import inline, table
 from replay.sinks.rerun_entities import RobotEntities
-from replay.sinks.rerun_text import cell, paragraph
 from replay.words import JUMPED, STATUS_WORDS, WITHDRAWN, capitalised, counted, merged_of
 
 _MOST_SAID = 8
@@ -53,7 +53,7 @@ class Setbacks:
                 self.count += 1
                 if len(self.first) < _MOST_WRONG:
                     what = _EVENTS[item["event"]].format(_bold(item["robot"]))
-                    self.first.append(f"{what}: {paragraph(item['reason']['message'])}")
+                    self.first.append(f"{what}: {inline(item['reason']['message'])}")
 
 
 def legend(*, has_ways: bool) -> str:
@@ -88,7 +88,7 @@ def summary(
     """
     parts = [
         f"# {capitalised(merged_of(report['robots']))}",
-        f"in the map frame of **{cell(robots[0].robot)}**, the reference",
+        f"in the map frame of **{inline(robots[0].robot)}**, the reference",
     ]
     parts.append(_table(report, robots))
     nothing = (
@@ -102,16 +102,18 @@ def summary(
 
 def _table(report: Report, robots: Sequence[RobotEntities]) -> str:
     """Return one row for each robot; of few and short columns, as tables do not wrap."""
-    rows = [("robot", "colour", "is", "how sure", "overlap"), ("---",) * 5]
+    rows = []
     for entities in robots:
         values = report["robots"][entities.robot]
-        rows.append((f"**{cell(entities.robot)}**", entities.colour_name, _is(values), _sure(values), _overlap(values)))
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+        rows.append(
+            (f"**{inline(entities.robot)}**", entities.colour_name, _is(values), _sure(values), _overlap(values))
+        )
+    return table(("robot", "colour", "is", "how sure", "overlap"), rows)
 
 
 def _is(values: Mapping[str, Any]) -> str:
     if values["placed_via"] is not None and values["merged_from_map"] is not None:
-        return f"merged, on {cell(values['placed_via'])}"
+        return f"merged, on {inline(values['placed_via'])}"
     words = STATUS_WORDS[values["status"]]
     return words if values["merged_from_map"] is not None else f"**{words}**"
 
@@ -131,12 +133,12 @@ def _overlap(values: Mapping[str, Any]) -> str:
 def _wrong(report: Report, setbacks: Setbacks, *, is_last: bool) -> list[str]:
     """Say which robots are not merged and why, what jumped or was withdrawn, and how much was skipped."""
     found = [
-        f"**{cell(robot)}** is not merged: {_reason(values['reason'], is_last=is_last)}"
+        f"**{inline(robot)}** is not merged: {_reason(values['reason'], is_last=is_last)}"
         for robot, values in report["robots"].items()
         if values["merged_from_map"] is None
     ]
     if skipped := sum(report["skipped"].values()):
-        causes = ", ".join(f"{count} {cell(cause)}" for cause, count in report["skipped"].items())
+        causes = ", ".join(f"{count} {inline(cause)}" for cause, count in report["skipped"].items())
         found.append(f"{counted(skipped, 'message')} skipped: {causes}; see *Decisions*")
     more = len(found) + setbacks.count - _MOST_WRONG
     found = [*found, *setbacks.first][:_MOST_WRONG]
@@ -148,19 +150,19 @@ def _wrong(report: Report, setbacks: Setbacks, *, is_last: bool) -> list[str]:
 def _reason(reason: Mapping[str, str], *, is_last: bool) -> str:
     """Return a reason in words, its code, and what may be done, in which commands are in backquotes."""
     code = ReasonCode(reason["code"])
-    said = f"{paragraph(reason['message'])} (`{code}`)."
+    said = f"{inline(reason['message'])} (`{code}`)."
     return f"{said} *What to do:* {ADVICE[code]}" if is_last and ADVICE[code] else said
 
 
 def _bold(robot: str) -> str:
-    return f"**{cell(robot)}**"
+    return f"**{inline(robot)}**"
 
 
 def _lately(said: Sequence[Said]) -> Iterator[str]:
     if len(said) > _MOST_SAID:
         yield f"*{len(said) - _MOST_SAID} earlier ones: see* Decisions"
     for item in said[-_MOST_SAID:]:
-        yield f"**{item.since}** {paragraph(item.words)}"
+        yield f"**{item.since}** {inline(item.words)}"
 
 
 def _items(items: Sequence[str] | Iterator[str], otherwise: str) -> list[str]:

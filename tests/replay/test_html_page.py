@@ -116,6 +116,17 @@ def test_the_row_and_the_reason_do_not_contradict_each_other(tmp_path: Path, lea
     assert said is not None
     (shown,) = re.findall(r"([\d.]+) m²", " ".join(row[:-1]))
     assert float(said[1]) == pytest.approx(float(shown), abs=0.5)
+    assert bool(re.search(r"99\.\d+% refused", " ".join(row))) == (status == "not merged")
+    assert ("least confidence" in found.words("verdict")) == (status == "merged")
+
+
+def test_a_pair_is_called_by_both_robots_and_placements_say_their_frame() -> None:
+    """The reason of either robot names the other one, whichever of them the figures take as fixed."""
+    found = Page(page_of("nobody_merged"))
+    assert [row[:2] for row in found.rows("pairs")] == [["r1", "r2"], ["r1", "r3"], ["r2", "r3"]]
+    merged = Page(page_of("merged"))
+    (caption,) = (" ".join("".join(each.itertext()).split()) for each in merged.section("pairs").iter("figcaption"))
+    assert caption.startswith("r1 and r2 accepted")
 
 
 def test_layers_of_the_map_are_those_of_the_placed_robots() -> None:
