@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from mapmerge.outcome import Change, ChangeKind
 from mapmerge.result import MergeResult
 from mapmerge.sim2 import Sim2
+from replay.events import Report
+from replay.plain_text import brief, listed
 from replay.words import JUMPED
 
 INFO, WARN = "INFO", "WARN"
@@ -18,6 +20,28 @@ def decisions(result: MergeResult) -> Iterator[Entry]:
     """Say what jumped, or was placed, moved or withdrawn in a step."""
     for change in result.changes:
         yield _decision(change, result.robots[change.robot].merged_from_map)
+
+
+def linked_otherwise(report: Report) -> str | None:
+    """Say which robots are placed by other matches in the end than when that was decided; None if nobody is.
+
+    Of matches that agree the strongest ones hold the maps together. Which these are changes often, and nothing else
+    with it: that is no decision, but the reasons of the end name other robots than those of the log.
+    """
+    said = {
+        item["robot"]: str(item["reason"]["message"])
+        for item in report["history"]
+        if item["event"] in (ChangeKind.PLACED, ChangeKind.MOVED)
+    }
+    via = {robot: values["placed_via"] for robot, values in report["robots"].items() if values["status"] == "merged"}
+    others = [
+        f"{brief(robot)} on {brief(other)}"
+        for robot, other in via.items()
+        if robot in said and not said[robot].startswith(f"placed on {other}: ")
+    ]
+    if not others:
+        return None
+    return f"placed by other matches in the end than when that was decided, at the same places: {listed(others)}"
 
 
 def _decision(change: Change, pose: Sim2 | None) -> Entry:

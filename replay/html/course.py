@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from mapmerge.outcome import ChangeKind
+from replay.decisions import linked_otherwise
 from replay.figures import seconds
 from replay.html.axes import Axis
 from replay.html.plots import Mark, time_axis, time_marks
@@ -78,6 +79,8 @@ class Course:
     ----------
     first, last, left_out
         The log; so many decisions in the middle are not listed.
+    otherwise
+        What it does not say.
     unmarked
         So many decisions in the middle are on no lane.
     """
@@ -87,6 +90,7 @@ class Course:
     first: tuple[Entry, ...]
     last: tuple[Entry, ...]
     left_out: int
+    otherwise: str | None
     unmarked: int
 
     @property
@@ -107,7 +111,8 @@ def course(story: Story) -> Course | None:
     entries = [_entry(story, decision) for decision in story.decisions]
     first, last = (entries, []) if len(entries) <= MOST_ENTRIES else _ends(entries)
     left_out = story.decisions_left_out + len(entries) - len(first) - len(last)
-    return Course(lanes, time_marks(over), tuple(first), tuple(last), left_out, story.decisions_left_out)
+    otherwise, unmarked = linked_otherwise(story.report), story.decisions_left_out
+    return Course(lanes, time_marks(over), tuple(first), tuple(last), left_out, otherwise, unmarked)
 
 
 def _ends(entries: Sequence[Entry]) -> tuple[list[Entry], list[Entry]]:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from replay.decisions import INFO, WARN, Entry
+from replay.decisions import INFO, WARN, Entry, linked_otherwise
 from replay.events import Merged, Noted, Report, Skipped
 from replay.figures import NO_FIGURE, area, degrees, fixed, percent, share
 from replay.markdown import inline, table
@@ -42,6 +42,8 @@ def outcome(report: Report) -> Iterator[Entry]:
     for robot, values in robots.items():
         if values["merged_from_map"] is None:
             yield WARN, f"{robot} is not merged: {values['reason']['message']}"
+    if (otherwise := linked_otherwise(report)) is not None:
+        yield INFO, f"end: {otherwise}"
 
 
 def robots_table(report: Report) -> str:

@@ -11,7 +11,7 @@ from typing import IO, TYPE_CHECKING
 from mapmerge.reasons import ReasonCode
 from replay.advice import ADVICE
 from replay.colours import are_on
-from replay.decisions import decisions
+from replay.decisions import decisions, linked_otherwise
 from replay.events import Event, Merged, Noted, Report, Skipped, Started
 from replay.figures import percent
 from replay.options import NS_PER_S
@@ -159,9 +159,11 @@ class Narrator:
             if early:
                 parts = list(dict.fromkeys(part for each in early if (part := part_of(each["place"]))))
                 self.say(recovered(item["name"], item["messages"], item["until_ns"], parts))
-        for cause, number in self._skipped.items():
-            if number > _SKIPPED_NAMED:
-                self.say(f"and {number - _SKIPPED_NAMED} more of {cause}: the report lists them under skipped_at")
+        if (otherwise := linked_otherwise(report)) is not None:
+            self.say(otherwise)
+        beyond = self._skipped - Counter(dict.fromkeys(self._skipped, _SKIPPED_NAMED))
+        for cause, more in beyond.items():
+            self.say(f"and {more} more of {cause}: the report lists them under skipped_at")
         skipped, late = sum(report["skipped"].values()), sum(item["late"] for item in report["inputs"])
         if skipped:
             least = {each["cause"] for each in report["skipped_at"] if each["messages"] is None}
