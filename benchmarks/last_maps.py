@@ -17,8 +17,8 @@ from benchmarks.recordings import BENT, RECORDINGS, last_grids
 from benchmarks.verdicts import MAX_ERROR_CELLS, MAX_ERROR_CELLS_BENT, Tolerance, Verdict, verdict
 from mapmerge.grid import Grid
 from mapmerge.sim2 import IDENTITY, Sim2
-from replay.evaluation.placement_error import error_of
 from replay.evaluation.truth import load_truth
+from replay.placement_error import error_of
 
 _SHORT = {
     Verdict.PLACED: "placed",

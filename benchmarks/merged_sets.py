@@ -13,7 +13,7 @@ from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.merger import Merger
 from mapmerge.sim2 import Sim2
-from replay.evaluation.placement_error import PlacementError, error_of
+from replay.placement_error import PlacementError, error_of
 from samples.mission import known_at
 
 

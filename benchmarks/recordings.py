@@ -16,11 +16,11 @@ from benchmarks.verdicts import MAX_ERROR_CELLS, MAX_ERROR_CELLS_BENT, Tolerance
 from mapmerge.config import MergeConfig
 from mapmerge.grid import Grid
 from mapmerge.sim2 import IDENTITY, Sim2
-from replay.evaluation.placement_error import PlacementError, error_of
 from replay.evaluation.truth import RobotTruth, load_truth
 from replay.events import Merged
 from replay.options import RunOptions
 from replay.pipeline import merge
+from replay.placement_error import PlacementError, error_of
 from replay.runs import RunPath
 from samples.mission import known_at
 

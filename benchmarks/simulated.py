@@ -12,7 +12,7 @@ from benchmarks.cases import Case
 from benchmarks.methods import load_method
 from benchmarks.recipes import raw_image
 from benchmarks.verdicts import Verdict, tolerance, verdict
-from replay.evaluation.placement_error import error_of
+from replay.placement_error import error_of
 from samples.pairs import Pair
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from replay.evaluation.placement_error import PlacementError
+from replay.placement_error import PlacementError
 
 MAX_ERROR_DEG = 1.0
 MAX_ERROR_CELLS, MAX_ERROR_CELLS_BENT = 2.0, 3.0

@@ -158,7 +158,7 @@ class Merger:
         self, centres_m: Mapping[str, tuple[float, float]], alone: dict[Pair, Match], matches: dict[Pair, Match]
     ) -> Forest:
         """Place robots; refuse those matches, also among those of pairs alone, with which a merged map is too large."""
-        forest = _placed(centres_m, matches, self._config)
+        forest = _forest(centres_m, matches, self._config)
         while too_large := self._too_large(forest):
             robot, extent = too_large
             via = forest.placements[robot].via
@@ -170,7 +170,7 @@ class Merger:
             )
             refused = replace(matches[pair], accepted=False, reason=Reason(ReasonCode.TOO_LARGE, message))
             matches[pair] = alone[pair] = refused
-            forest = _placed(centres_m, matches, self._config)
+            forest = _forest(centres_m, matches, self._config)
         return forest
 
     def _too_large(self, forest: Forest) -> tuple[str, Extent] | None:
@@ -198,7 +198,7 @@ class Merger:
         return changes
 
 
-def _placed(centres_m: Mapping[str, tuple[float, float]], pairs: Mapping[Pair, Match], config: MergeConfig) -> Forest:
+def _forest(centres_m: Mapping[str, tuple[float, float]], pairs: Mapping[Pair, Match], config: MergeConfig) -> Forest:
     edges = [
         Edge(target, source, match.target_from_source, match.trust, centres_m[source])
         for (target, source), match in pairs.items()

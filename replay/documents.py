@@ -95,6 +95,13 @@ class Node:
                 meant = f"did you mean '{close[0]}'?" if close else f"expected {', '.join(known)}"
                 raise InputError(f"{self.file}: {node.place}: there is no key '{brief(key)}' here; {meant}")
 
+    def no_slips(self, known: Collection[str]) -> None:
+        """Refuse keys that are nearly like one that is known; others are left alone."""
+        for key, node in self.items():
+            close = [] if key in known else get_close_matches(key, known, n=1, cutoff=0.8)
+            if close:
+                raise InputError(f"{self.file}: {node.place}: did you mean '{close[0]}'?")
+
     def text(self) -> str:
         """Return the value as text."""
         return self.value if isinstance(self.value, str) else self.refuse("a text")

@@ -7,11 +7,12 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from replay.console import Talk, open_notes
 from replay.errors import UsageError
 from replay.events import Report
 from replay.options import OutputOptions, RunOptions
 from replay.sinks.base import Sink
-from replay.sinks.terminal import Narrator, ProgressSink, Talk, open_notes
+from replay.sinks.terminal import Narrator, ProgressSink
 
 if TYPE_CHECKING:
     from replay.plan import Plan

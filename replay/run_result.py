@@ -35,7 +35,7 @@ class RobotResult:
         How sure that is; None where nothing tells.
     merged_after_s
         When it was placed first, in seconds since the run's first map; None if it never was, or nothing tells.
-    map_frame, map_topic
+    map_frame
         What its map is called.
     centre_m
         The middle of what its map knows, in its map frame; None where nothing tells.
@@ -53,7 +53,6 @@ class RobotResult:
     overlap_m2: float | None
     merged_after_s: float | None
     map_frame: str
-    map_topic: str
     centre_m: tuple[float, float] | None = None
     recorded_frame: str | None = None
 
@@ -174,7 +173,6 @@ def _robot(robot: str, node: Node, first_ns: int | None) -> RobotResult:
         node.maybe("overlap_m2", Node.number),
         None if merged_ns is None or first_ns is None else (merged_ns - first_ns) / 1e9,
         node.need("map_frame").text(),
-        node.need("map_topic").text(),
         node.maybe("centre_m", Node.place_m),
         node.maybe("recorded_frame", Node.text),
     )

@@ -38,7 +38,6 @@ FLAGS: Mapping[str, str] = {
 """Flags of ros2 bag, evo, rsync and others → ours."""
 
 COMMANDS: Mapping[str, str] = {
-    "help": "--help",
     "version": "--version",
     "play": "merge",
     "run": "merge",

@@ -17,9 +17,9 @@ from benchmarks.faults.pieces import alike, shifts
 from mapmerge.grid import Grid
 from mapmerge.sim2 import Sim2
 from replay.codec import decode
-from replay.evaluation.placement_error import error_of
 from replay.evaluation.truth import load_truth
 from replay.events import Merged
+from replay.placement_error import error_of
 from replay.sources.base import GRID_TYPE, RawMessage
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -68,11 +68,3 @@ def nearest_pairs(ones: Features, others: Features) -> Cells:
         - 2.0 * ones.descriptors @ others.descriptors.T
     )
     return np.stack([np.arange(len(ones.pixels)), np.argmin(squared, axis=1)], axis=1).astype(np.intp)
-
-
-def all_pairs(ones: int, others: int) -> Cells:
-    """Return every feature of the one with every feature of the other (equation 22), shape (N · M, 2).
-
-    Corners and ends of straight walls have nearly the same descriptors, so that the nearest one says nothing.
-    """
-    return np.stack(np.meshgrid(np.arange(ones), np.arange(others), indexing="ij"), axis=-1).reshape(-1, 2)

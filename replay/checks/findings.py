@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mapmerge.rounding import rounded_down
-from mapmerge.sim2 import Sim2, wrap_angle
+from mapmerge.sim2 import Sim2
 from replay.checks.expectation import Expectation, PoseExpectation, RobotExpectation
+from replay.placement_error import error_of
 from replay.run_result import RobotResult, RunResult
 
 RUN = "run"
@@ -108,15 +109,13 @@ def _pose(robot: str, expected: PoseExpectation, found: Sim2 | None) -> Finding:
     what = f"it lies at {where}, within {expected.within_m:g} m and {expected.within_deg:g}°"
     if found is None:
         return Finding(robot, what, False, "it is not placed")
-    (x_m, y_m), (true_x_m, true_y_m) = found.apply_point(*expected.at_m), true.apply_point(*expected.at_m)
-    off_m = math.hypot(x_m - true_x_m, y_m - true_y_m)
-    off_deg = abs(math.degrees(wrap_angle(found.yaw_rad - true.yaw_rad)))
-    holds = off_m <= expected.within_m and off_deg <= expected.within_deg
-    said = f"it lies {off_m:.3f} m and {off_deg:.2f}° off, at {found.in_words(3)}"
+    off = error_of(found, true, expected.at_m)
+    holds = off.within(expected.within_m, expected.within_deg)
+    said = f"it lies {off.distance_m:.3f} m and {off.angle_deg:.2f}° off, at {found.in_words(3)}"
     if expected.scaled:
-        off = abs(found.scale / true.scale - 1.0)
+        ratio = abs(found.scale / true.scale - 1.0)
         what += f", with scale {true.scale:g} within {expected.within_scale:g}"
-        holds, said = holds and off <= expected.within_scale, f"{said}, with scale {found.scale:.4f}"
+        holds, said = holds and ratio <= expected.within_scale, f"{said}, with scale {found.scale:.4f}"
     return Finding(robot, what, holds, said)
 
 

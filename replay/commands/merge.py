@@ -82,11 +82,11 @@ def _print(report: Report, options: argparse.Namespace) -> None:
 
 def _missing(report: Report) -> str:
     """Return who is not merged."""
-    left = [robot for robot, row in report["robots"].items() if row["status"] not in ("reference", "merged")]
+    left = [robot for robot, row in report["robots"].items() if row["merged_from_map"] is None]
     return f"not merged: {listed([plain(robot) for robot in left])}" if left else "there is only one map"
 
 
 def _all_merged(report: Report) -> bool:
     """Tell whether there was something to merge and all of it was."""
-    statuses = [robot["status"] for robot in report["robots"].values()]
-    return len(statuses) > 1 and all(status in ("reference", "merged") for status in statuses)
+    poses = [robot["merged_from_map"] for robot in report["robots"].values()]
+    return len(poses) > 1 and None not in poses

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from mapmerge.sim2 import Sim2, wrap_angle
 from replay.errors import UsageError
+from replay.placement_error import error_of
 from replay.run_result import RobotResult, RunResult
 
 _DIGITS = 6
@@ -164,14 +165,13 @@ def _moved(robot: str, one: Sim2, other: Sim2, at_m: tuple[float, float], tolera
     dx_m, dy_m = to_x_m - x_m, to_y_m - y_m
     turn_deg = math.degrees(wrap_angle(other.yaw_rad - one.yaw_rad))
     ratio = other.scale / one.scale
-    is_same_place = math.hypot(dx_m, dy_m) <= tolerance.distance_m
-    if is_same_place and abs(turn_deg) <= tolerance.angle_deg and abs(ratio - 1.0) <= tolerance.share:
+    off = error_of(other, one, at_m)
+    if off.within(tolerance.distance_m, tolerance.angle_deg) and abs(ratio - 1.0) <= tolerance.share:
         return
-    distance_m = math.hypot(dx_m, dy_m)
-    detail = f"by {distance_m:.3f} m (x {dx_m:+.3f}, y {dy_m:+.3f}), turned by {turn_deg:+.2f}°"
+    detail = f"by {off.distance_m:.3f} m (x {dx_m:+.3f}, y {dy_m:+.3f}), turned by {turn_deg:+.2f}°"
     if ratio != 1.0:
         detail += f", scaled by {ratio:.4f}"
-    amounts = {"distance_m": distance_m, "dx_m": dx_m, "dy_m": dy_m, "turn_deg": turn_deg, "scale_ratio": ratio}
+    amounts = {"distance_m": off.distance_m, "dx_m": dx_m, "dy_m": dy_m, "turn_deg": turn_deg, "scale_ratio": ratio}
     yield Difference(robot, "moved", one.in_words(3), other.in_words(3), detail, _rounded(amounts))
 
 

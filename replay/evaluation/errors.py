@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from replay.evaluation.placement_error import PlacementError, error_of
+from replay.errors import InputError
 from replay.evaluation.truth import RobotTruth, Truth
+from replay.placement_error import ELSEWHERE_DEG, ELSEWHERE_M, PlacementError, error_of
 from replay.run_result import RobotResult, RunResult
 
 
@@ -24,22 +25,17 @@ class Verdict(StrEnum):
     FALSE_MERGE = "false merge"
     """Merged, though its map is of another place."""
     REFUSED = "refused"
-    """Not merged, and rightly so."""
+    """Not merged, or not even there, and rightly so."""
     ABSENT = "absent"
-    """The run has no such robot."""
+    """The run has no such robot, though its map is of the same place."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """How large errors may be; None where that is not limited."""
+    """How large errors may be; what is not said is that within which a placement is at the right place."""
 
-    distance_m: float | None
-    angle_deg: float | None
-
-    @property
-    def are_any(self) -> bool:
-        """Whether anything is limited."""
-        return self.distance_m is not None or self.angle_deg is not None
+    distance_m: float = ELSEWHERE_M
+    angle_deg: float = ELSEWHERE_DEG
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,18 +58,18 @@ class RobotError:
     def beyond(self, limits: Limits) -> str:
         """Return in words what is more than the limits allow; empty if nothing is.
 
-        Whoever is missed, at another place, or merged though it does not belong, is beyond any.
+        Whoever is missed or absent, or merged though it does not belong, is beyond any.
         """
         if self.verdict is Verdict.REFUSED:
             return ""
         if self.error is None:
             return str(self.verdict)
         off = []
-        if limits.distance_m is not None and self.error.distance_m > limits.distance_m:
+        if self.error.distance_m > limits.distance_m:
             off.append(f"{self.error.distance_m:.3f} m off, at most {limits.distance_m:g} allowed")
-        if limits.angle_deg is not None and self.error.angle_deg > limits.angle_deg:
+        if self.error.angle_deg > limits.angle_deg:
             off.append(f"turned by {self.error.angle_deg:.2f}°, at most {limits.angle_deg:g} allowed")
-        return "; ".join(off) or (str(self.verdict) if self.verdict is Verdict.ELSEWHERE else "")
+        return "; ".join(off)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,16 +108,27 @@ class PoseErrors:
 
 
 def pose_errors(result: RunResult, truth: Truth) -> PoseErrors:
-    """Hold a run against the truth, which is in the frame of the run's reference."""
-    robots = tuple(_error(name, result.robots.get(name), known) for name, known in truth.robots.items())
-    unknown = tuple(name for name in result.robots if name not in truth.robots and name != result.reference)
+    """Hold a run against the truth, which is in the frame of the run's reference.
+
+    Raises
+    ------
+    InputError
+        If the truth says nothing of any robot of the run.
+    """
+    known = {name: item for name, item in truth.robots.items() if name != result.reference}
+    if not known.keys() & result.robots.keys():
+        there = ", ".join(name for name in result.robots if name != result.reference)
+        raise InputError(f"{result.name}: there is no truth of any of its robots; expected that of {there or 'some'}")
+    robots = tuple(_error(name, result.robots.get(name), item) for name, item in known.items())
+    unknown = tuple(name for name in result.robots if name not in known and name != result.reference)
     return PoseErrors(robots, unknown)
 
 
 def _error(name: str, robot: RobotResult | None, truth: RobotTruth) -> RobotError:
+    true = truth.reference_from_map
     if robot is None:
-        return RobotError(name, Verdict.ABSENT, None, "")
-    true, found = truth.reference_from_map, robot.merged_from_map
+        return RobotError(name, Verdict.REFUSED if true is None else Verdict.ABSENT, None, "")
+    found = robot.merged_from_map
     if found is None:
         return RobotError(name, Verdict.REFUSED if true is None else Verdict.MISSED, None, robot.reason)
     if true is None:

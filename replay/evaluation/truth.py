@@ -12,6 +12,8 @@ from replay.documents import Node
 from replay.errors import InputError
 from replay.read_document import read_json
 
+_POSE = ("x_m", "y_m", "yaw_rad", "yaw_deg")
+
 
 @dataclass(frozen=True, slots=True)
 class RobotTruth:
@@ -82,7 +84,7 @@ class Truth:
 
 
 def load_truth(path: Path) -> Truth:
-    """Read a truth file; keys that are not used are left alone.
+    """Read a truth file; keys that are not used are left alone, unless they are nearly like one that is.
 
     Raises
     ------
@@ -94,6 +96,7 @@ def load_truth(path: Path) -> Truth:
 
 def truth_of(node: Node) -> Truth:
     """Read what is truly so."""
+    node.no_slips(("reference", "robots", "reference_from_true_map"))
     return Truth(
         node.need("reference").text(),
         {name: _robot(item) for name, item in node.need("robots").items()},
@@ -102,6 +105,7 @@ def truth_of(node: Node) -> Truth:
 
 
 def _robot(node: Node) -> RobotTruth:
+    node.no_slips(("same_place", "overlap_centre_m", *_POSE))
     same_place = node.maybe("same_place", Node.truth)
     return RobotTruth(
         None if same_place is False else _pose(node),
@@ -110,6 +114,9 @@ def _robot(node: Node) -> RobotTruth:
 
 
 def _pose(node: Node) -> Sim2:
+    node.no_slips(_POSE)
     degrees = node.maybe("yaw_deg", Node.number)
+    if degrees is not None and node.get("yaw_rad") is not None:
+        node.refuse("either yaw_deg or yaw_rad")
     yaw_rad = node.need("yaw_rad").number() if degrees is None else math.radians(degrees)
     return Sim2(node.need("x_m").number(), node.need("y_m").number(), yaw_rad)

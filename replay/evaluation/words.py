@@ -32,7 +32,7 @@ class MapEvaluation:
     tolerance_m: float
 
 
-def lines(errors: PoseErrors, of_map: MapEvaluation | None, limits: Limits) -> Iterator[str]:
+def lines(errors: PoseErrors, of_map: MapEvaluation | None, limits: Limits | None) -> Iterator[str]:
     """Yield an evaluation as lines to read; what is beyond the limits comes last."""
     rows = [("robot", "verdict", "position", "turn", "reason")]
     for item in errors.robots:
@@ -46,7 +46,7 @@ def lines(errors: PoseErrors, of_map: MapEvaluation | None, limits: Limits) -> I
     yield ", ".join(f"{errors.count(verdict)} {verdict}" for verdict in Verdict if errors.count(verdict))
     if of_map is not None:
         yield from _map_lines(of_map)
-    if limits.are_any:
+    if limits is not None:
         yield from (f"beyond the limits: {plain(robot)}: {what}" for robot, what in errors.beyond(limits).items())
 
 
@@ -66,7 +66,7 @@ def _map_lines(of_map: MapEvaluation) -> Iterator[str]:
     yield from columns(rows)
 
 
-def json_text(errors: PoseErrors, of_map: MapEvaluation | None, limits: Limits) -> str:
+def json_text(errors: PoseErrors, of_map: MapEvaluation | None, limits: Limits | None) -> str:
     """Return an evaluation as JSON."""
     values: dict[str, Any] = {
         "robots": {
@@ -82,7 +82,7 @@ def json_text(errors: PoseErrors, of_map: MapEvaluation | None, limits: Limits) 
         "rmse_m": errors.rmse_m,
         "rmse_deg": errors.rmse_deg,
         "counts": {str(verdict): errors.count(verdict) for verdict in Verdict},
-        "beyond": errors.beyond(limits) if limits.are_any else None,
+        "beyond": None if limits is None else errors.beyond(limits),
         "map": None
         if of_map is None
         else {

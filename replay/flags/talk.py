@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from replay.errors import UsageError
 
 if TYPE_CHECKING:
-    from replay.sinks.terminal import Talk
+    from replay.console import Talk
 
 COLOURS = ("auto", "always", "never")
 
@@ -50,7 +50,7 @@ def of(options: argparse.Namespace) -> Talk:
     UsageError
         If it is to be nothing, and all.
     """
-    from replay.sinks.terminal import Talk
+    from replay.console import Talk
 
     if options.quiet and options.verbose:
         raise UsageError("--quiet and --verbose: expected one of them")

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from enum import IntEnum
 from time import perf_counter
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from mapmerge.reasons import ReasonCode
 from replay.advice import ADVICE
-from replay.colours import are_on
+from replay.console import Talk
 from replay.decisions import decisions, linked_otherwise
 from replay.events import Event, Merged, Noted, Report, Skipped, Started
 from replay.figures import percent
@@ -18,28 +17,15 @@ from replay.options import NS_PER_S
 from replay.plain_text import listed, plain
 from replay.skip_cause import SkipCause
 from replay.sources.losses import part_of
-from replay.standard_streams import quiet_stderr
 from replay.words import counted, intention, lost, merged_of, moment, recovered, unused
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
-_WIDTH_WHERE_NO_TERMINAL = 400
 _SKIPPED_NAMED = 5
 _LONGEST_RUN_S = 1e6
 """Messages farther from the first map than this have a time that is not to be believed."""
-
-
-class Talk(IntEnum):
-    """How much is said."""
-
-    QUIET = 0
-    """Nothing."""
-    USUAL = 1
-    """What is worth a line."""
-    VERBOSE = 2
-    """What was done at each time, as well."""
 
 
 class ProgressSink:
@@ -109,7 +95,7 @@ class Narrator:
 
     def take(self, event: Event) -> None:
         """Say what is worth a line, and add up the time."""
-        if isinstance(event, Started) and (self._announce or len(event.robots) == 1):
+        if isinstance(event, Started) and self._announce:
             self.say(intention([f"{item.robot} ({item.topic})" for item in event.robots], "merging {} into {}"))
             if self.unused_topics:
                 self.say(unused(self.unused_topics))
@@ -153,35 +139,20 @@ class Narrator:
         return f"{event.topic} at {moment(event.log_time_ns)}{since}"
 
     def sum_up(self, report: Report, paths: Sequence[str]) -> None:
-        """Say what was skipped, how long it took, and what was written."""
-        for item in report["inputs"]:
-            early = [each for each in report["skipped_at"] if _ends_early(each) and each["input"] == item["name"]]
-            if early:
-                parts = list(dict.fromkeys(part for each in early if (part := part_of(each["place"]))))
-                self.say(recovered(item["name"], item["messages"], item["until_ns"], parts))
-        if (otherwise := linked_otherwise(report)) is not None:
-            self.say(otherwise)
+        """Say what was skipped, what became of the maps, how long it took, and what was written."""
         beyond = self._skipped - Counter(dict.fromkeys(self._skipped, _SKIPPED_NAMED))
-        for cause, more in beyond.items():
-            self.say(f"and {more} more of {cause}: the report lists them under skipped_at")
-        skipped, late = sum(report["skipped"].values()), sum(item["late"] for item in report["inputs"])
-        if skipped:
-            least = {each["cause"] for each in report["skipped_at"] if each["messages"] is None}
-            causes = ", ".join(f"{_least(cause in least)}{count} {cause}" for cause, count in report["skipped"].items())
-            self.say(f"{_least(bool(least))}{counted(skipped, 'message')} skipped: {causes}")
-        bad_stamps = sum(item["bad_stamps"] for item in report["inputs"])
-        if bad_stamps:
-            self.say(
-                f"{counted(bad_stamps, 'message')} with a time far from those around: taken at the time at which "
-                f"{'it was' if bad_stamps == 1 else 'they were'} recorded"
-            )
-        if late:
-            self.say(f"{counted(late, 'message')} too late to be put in order of time: taken in on arrival")
+        lines = [
+            *ended_early(report),
+            *(f"and {more} more of {cause}: the report lists them under skipped_at" for cause, more in beyond.items()),
+            *not_used(report),
+        ]
         if len(report["robots"]) > 1:
-            self.say(merged_of(report["robots"]))
-        for line in what_to_do(report):
-            self.say(line)
+            lines += [merged_of(report["robots"]), *filter(None, [linked_otherwise(report)])]
+        elif not self._announce:
+            lines.append(intention([f"{robot} ({row['map_topic']})" for robot, row in report["robots"].items()], ""))
         spent_s = perf_counter() - self._begin_s
+        for line in (*lines, *what_to_do(report)):
+            self.say(line)
         self.say(
             f"{counted(report['updates'], 'map')} at {counted(self._ticks, 'time')} in {spent_s:.1f} s: "
             f"{self._merge_s:.1f} s merging, {self._render_s:.1f} s drawing; wrote {', '.join(paths) or 'nothing'}"
@@ -212,6 +183,32 @@ def _ends_early(skipped: Report) -> bool:
     return bool(skipped["cause"] == SkipCause.ENDS_EARLY)
 
 
+def ended_early(report: Report) -> Iterator[str]:
+    """Yield what was read of recordings that end early."""
+    for item in report["inputs"]:
+        early = [each for each in report["skipped_at"] if _ends_early(each) and each["input"] == item["name"]]
+        if early:
+            parts = list(dict.fromkeys(part for each in early if (part := part_of(each["place"]))))
+            yield recovered(item["name"], item["messages"], item["until_ns"], parts)
+
+
+def not_used(report: Report) -> Iterator[str]:
+    """Yield how many messages were skipped, or were taken in at another time than they say."""
+    skipped, late = sum(report["skipped"].values()), sum(item["late"] for item in report["inputs"])
+    if skipped:
+        least = {each["cause"] for each in report["skipped_at"] if each["messages"] is None}
+        causes = ", ".join(f"{_least(cause in least)}{count} {cause}" for cause, count in report["skipped"].items())
+        yield f"{_least(bool(least))}{counted(skipped, 'message')} skipped: {causes}"
+    bad_stamps = sum(item["bad_stamps"] for item in report["inputs"])
+    if bad_stamps:
+        yield (
+            f"{counted(bad_stamps, 'message')} with a time far from those around: taken at the time at which "
+            f"{'it was' if bad_stamps == 1 else 'they were'} recorded"
+        )
+    if late:
+        yield f"{counted(late, 'message')} too late to be put in order of time: taken in on arrival"
+
+
 def what_to_do(report: Report) -> Iterator[str]:
     """Yield what may be done about maps that are not merged, once for each reason."""
     by_reason: dict[ReasonCode, list[str]] = {}
@@ -234,25 +231,3 @@ def told(event: Merged, after: str) -> Iterator[str]:
         yield f"  {pair[1]} on {pair[0]} searched, as {trigger.words}: {verdict}{sure}: {match.reason.message}"
     for remark in event.remarks:
         yield f"  {remark}"
-
-
-def open_notes(colour: str = "auto") -> Console:
-    """Return a console on standard error, which falls silent where that cannot be written."""
-    return open_console(quiet_stderr(), colour)
-
-
-def open_console(stream: IO[str], colour: str = "auto") -> Console:
-    """Return a console; where there is no terminal, lines are not broken at its width."""
-    from rich.console import Console
-
-    on = are_on(stream, colour)
-    return Console(
-        file=stream,
-        width=None if stream.isatty() else _WIDTH_WHERE_NO_TERMINAL,
-        highlight=False,
-        soft_wrap=False,
-        # the library would take what forces colours for a terminal, and show its progress there
-        force_terminal=stream.isatty(),
-        no_color=not on,
-        color_system=("auto" if stream.isatty() else "standard") if on else None,
-    )

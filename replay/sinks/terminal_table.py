@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
+from replay.console import open_console
 from replay.events import Report
 from replay.figures import area, degrees, fixed, percent, share
 from replay.plain_text import plain
-from replay.sinks.terminal import open_console
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -15,7 +15,7 @@ from benchmarks.verdicts import Tolerance, Verdict, tolerance, verdict
 from mapmerge.grid import Grid
 from mapmerge.match import MATCHERS
 from mapmerge.sim2 import IDENTITY, Sim2
-from replay.evaluation.placement_error import PlacementError, error_of
+from replay.placement_error import PlacementError, error_of
 from samples.kinds import KINDS
 from tests.floors import flat, in_frame, office_pair
 

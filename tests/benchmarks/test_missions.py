@@ -8,11 +8,11 @@ from benchmarks.long_mission import MARGIN_CELLS, Mission, main
 from benchmarks.made_once import recorded
 from mapmerge.config import MergeConfig
 from replay.codec import decode
-from replay.evaluation.placement_error import error_of
 from replay.evaluation.truth import load_truth
 from replay.events import Merged
 from replay.options import RunOptions
 from replay.pipeline import merge
+from replay.placement_error import error_of
 from replay.runs import RunPath
 from replay.sources import open_source
 

@@ -64,14 +64,12 @@ def test_positions_are_compared_amid_the_overlap(replay: Program, outcome: Path)
         (of_r2(Sim2(TRUE.x_m + 1.5, TRUE.y_m, TRUE.yaw_rad)), "elsewhere"),
         (of_r2(Sim2(TRUE.x_m, TRUE.y_m, TRUE.yaw_rad + 0.2)), "elsewhere"),
         (of_r2(same_place=False), "false merge"),
-        ({"reference": "r1", "robots": {"r7": as_truth(TRUE)}}, "absent"),
     ],
 )
 def test_what_became_of_a_robot(replay: Program, outcome: Path, truth: dict[str, Any], verdict: str) -> None:
     ran = evaluated(replay, outcome, truth)
     assert ran.status == 0
     assert f"1 {verdict}" in ran.out.splitlines()
-    assert ("r2: there is no truth of it" in ran.out) == (verdict == "absent")
     limited = evaluated(replay, outcome, truth, "--max-error-m", "0.2", "--max-error-deg", "1")
     assert limited.status == (0 if verdict == "placed" else 1)
 
@@ -115,11 +113,42 @@ def test_what_is_beyond_which_limit_is_said(replay: Program, outcome: Path) -> N
     assert missed == "beyond the limits: r2: false merge"
 
 
-def test_another_place_is_beyond_any_limit(replay: Program, outcome: Path) -> None:
+def test_another_place_is_beyond_a_limit_of_the_turn_alone(replay: Program, outcome: Path) -> None:
     elsewhere = of_r2(Sim2(TRUE.x_m + 3.0, TRUE.y_m, TRUE.yaw_rad))
     ran = evaluated(replay, outcome, elsewhere, "--max-error-deg", 5, "--json")
     assert ran.status == 1
-    assert json.loads(ran.out)["beyond"] == {"r2": "elsewhere"}
+    (said,) = json.loads(ran.out)["beyond"].values()
+    assert said.endswith(" m off, at most 1 allowed")
+    assert evaluated(replay, outcome, elsewhere, "--max-error-m", 4, "--max-error-deg", 5).status == 0
+
+
+def test_a_robot_that_is_not_there_is_absent(replay: Program, outcome: Path) -> None:
+    truth = of_r2()
+    truth["robots"]["r7"] = as_truth(TRUE)
+    ran = evaluated(replay, outcome, truth, "--max-error-m", 3)
+    assert (ran.status, ran.out.splitlines()[-1]) == (1, "beyond the limits: r7: absent")
+    assert "1 placed, 1 absent" in ran.out.splitlines()
+
+
+def test_robots_without_truth_are_named(replay: Program, outcome: Path) -> None:
+    report = json.loads(outcome.with_suffix(".json").read_text(encoding="utf-8"))
+    report["robots"]["r3"] = report["robots"]["r2"]
+    run = replay.folder / "run.json"
+    run.write_text(json.dumps(report), encoding="utf-8")
+    assert "r3: there is no truth of it" in evaluated(replay, run, of_r2()).out.splitlines()
+
+
+def test_nobody_is_told_that_all_is_well_of_robots_without_truth(replay: Program, outcome: Path) -> None:
+    ran = evaluated(replay, outcome, {"reference": "r1", "robots": {}}, "--max-error-m", 3)
+    assert ran.status == 2
+    assert "there is no truth of any of its robots; expected that of r2" in ran.error
+
+
+def test_a_stranger_that_is_not_there_is_no_error(replay: Program, outcome: Path) -> None:
+    truth = of_r2()
+    truth["robots"]["r9"] = {"same_place": False}
+    ran = evaluated(replay, outcome, truth, "--max-error-m", 3)
+    assert (ran.status, ran.out.splitlines()[-1]) == (0, "1 placed, 1 refused")
 
 
 def test_degrees_are_taken_as_well(replay: Program, outcome: Path) -> None:
@@ -135,6 +164,9 @@ def test_degrees_are_taken_as_well(replay: Program, outcome: Path) -> None:
         ({"reference": "r1", "robots": {"r2": {"x_m": 1}}}, "robots.r2 has no 'yaw_rad'"),
         ({"reference": "r1", "robots": {"r2": as_truth(TRUE, overlap_centre_m=[1])}}, "[x, y], two numbers"),
         ({"reference": "r1", "robots": {"r2": as_truth(TRUE, same_place="no")}}, "expected true or false"),
+        ({"reference": "r1", "robots": {"r2": as_truth(TRUE, yaw_deg=3)}}, "expected either yaw_deg or yaw_rad"),
+        ({"reference": "r1", "robot": {}, "robots": {}}, "robot: did you mean 'robots'?"),
+        (of_r2(overlap_center_m=[1, 2]), "r2.overlap_center_m: did you mean 'overlap_centre_m'?"),
     ],
 )
 def test_what_is_wrong_in_a_truth_is_named(replay: Program, outcome: Path, truth: object, said: str) -> None:

@@ -64,6 +64,14 @@ def test_one_map_alone_is_said_to_be_merged_with_nothing(replay: Program, run: P
     assert "only one map" not in replay.merge(run, "--robots", "r1,r2", "--force").err
 
 
+def test_names_are_said_as_they_are(replay: Program, tmp_path: Path) -> None:
+    run = write_mcap(tmp_path / "run.mcap", growing("r1", topic="/:bus:/map"))
+    ran = replay("merge", run, "-o", "out:bus:[bold].mcap", "--no-rrd")
+    assert "wrote out:bus:[bold].mcap" in ran.err
+    assert "only one map, :bus: (/:bus:/map)" in ran.err
+    assert ran.out.splitlines()[1].startswith(":bus:  reference")
+
+
 def test_help_fits_the_terminal(replay: Program, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "60")
     for command in COMMANDS:

@@ -17,7 +17,7 @@ from mapmerge.paper.consensus import (
     limits_m,
     refitted,
 )
-from mapmerge.paper.features import all_pairs, nearest_pairs, one_a_place, sift
+from mapmerge.paper.features import nearest_pairs, one_a_place, sift
 from mapmerge.paper.icp import icp, least_squares, occupied_cells
 from mapmerge.paper.ransac import Bounds, drawn_models, models_of_all_pairs, two_pair_models
 from mapmerge.sim2 import Sim2
@@ -109,7 +109,7 @@ class TestModels:
     def test_too_few_features_give_no_model(self, counts):
         p, q = scattered(counts[0]), scattered(counts[1])
         assert len(models_of_all_pairs(p, q, ANY, 100, 0)) == 0
-        assert len(drawn_models(p, q, all_pairs(*counts)[:1], ANY, 100, 0)) == 0
+        assert len(drawn_models(p, q, np.zeros((min(1, *counts), 2), np.intp), ANY, 100, 0)) == 0
 
     def test_the_best_models_are_distinct(self):
         p = scattered(30)
@@ -149,9 +149,6 @@ class TestFeatures:
         picture = np.random.default_rng(0).choice(np.array([0, 255], np.uint8), (60, 60))
         found = sift(picture, 0, 40)
         assert nearest_pairs(found, found).tolist() == [[each, each] for each in range(len(found.pixels))]
-
-    def test_all_pairs_are_all_pairs(self):
-        assert all_pairs(2, 3).tolist() == [[0, 0], [0, 1], [0, 2], [1, 0], [1, 1], [1, 2]]
 
 
 class TestIcp:
