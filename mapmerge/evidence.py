@@ -59,6 +59,8 @@ class SurfaceEvidence:
         Row and column of the peaks that were followed, best first.
     chosen
         Row and column of the shift that was chosen, where it lies on this surface.
+    turn_rad
+        By how much the source's map frame is turned in the target's at this surface; None where that is not said.
     """
 
     step: str
@@ -66,6 +68,7 @@ class SurfaceEvidence:
     values: NDArray[np.float32]
     marks: tuple[tuple[int, int], ...]
     chosen: tuple[int, int] | None
+    turn_rad: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

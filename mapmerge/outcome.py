@@ -91,8 +91,8 @@ class RobotOutcome:
     shown_pair
         The match that placed it or, if it is not placed, its best refused one.
     confidence
-        Probability that it is placed rightly, through all matches that place it; None where it is not placed, or
-        the method states none.
+        Probability that it is placed rightly, through all matches that place it; of one that is not placed, that its
+        best refused candidate is right. None where the method states none.
     """
 
     status: Status
@@ -194,7 +194,8 @@ def _unplaced_outcome(
     else:
         other = pair[0] if pair[1] == robot else pair[1]
         reason = Reason(match.reason.code, f"not placed on {other}: {match.reason.message}")
-    return RobotOutcome(Status.UNMERGED, reason, None, agreement, placement, pair)
+    confidence = match.confidence if match else None
+    return RobotOutcome(Status.UNMERGED, reason, None, agreement, placement, pair, confidence)
 
 
 def _partner(robot: str, pairs: Mapping[Pair, Match]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -27,7 +28,8 @@ from mapmerge.drawing import (
 from mapmerge.evidence import CurvesEvidence, Evidence, ImagesEvidence, OverlayEvidence, SurfaceEvidence
 from mapmerge.prepared import CELL_FREE, CELL_UNKNOWN, MEETS_WALL, PreparedMap
 from mapmerge.render_images import side_by_side
-from mapmerge.sim2 import Points, Sim2
+from mapmerge.rounding import fixed
+from mapmerge.sim2 import Points, Sim2, wrap_angle
 
 __all__ = ["MAX_SIDE_PX", "Label", "Named", "Picture", "Rgb", "render"]
 
@@ -73,12 +75,13 @@ def render(evidence: Evidence, named: Named | None = None) -> Picture:
         case CurvesEvidence():
             rgb = _curves(evidence, named)
         case SurfaceEvidence():
-            rgb = _surface(evidence)
+            rgb = _surface(evidence, _turned(evidence, named))
         case OverlayEvidence():
             rgb = _overlay(evidence, named)
         case ImagesEvidence():
             rgb = side_by_side(evidence, named)
-    return Picture(evidence.step, evidence.title, rgb)
+    title = _turned(evidence, named) if isinstance(evidence, SurfaceEvidence) else evidence.title
+    return Picture(evidence.step, title, rgb)
 
 
 def _curves(evidence: CurvesEvidence, named: Named) -> Rgb:
@@ -129,7 +132,15 @@ def _polyline(
     cv2.polylines(image, [points], isClosed=False, color=colour, thickness=2, lineType=cv2.LINE_AA)
 
 
-def _surface(evidence: SurfaceEvidence) -> Rgb:
+def _turned(evidence: SurfaceEvidence, named: Named) -> str:
+    """Return the title of a surface, with the turn of the source as placements say it."""
+    if evidence.turn_rad is None:
+        return evidence.title
+    degrees = fixed(math.degrees(wrap_angle(evidence.turn_rad)), 1)
+    return f"{evidence.title}, {named.source.words} turned by {degrees}° on {named.target.words}"
+
+
+def _surface(evidence: SurfaceEvidence, title: str) -> Rgb:
     """Brighter is better; followed peaks are circled, the chosen one is filled."""
     values = evidence.values
     low, high = float(np.percentile(values, 5)), float(values.max())
@@ -145,7 +156,7 @@ def _surface(evidence: SurfaceEvidence) -> Rgb:
     if evidence.chosen is not None:
         _circle(image, _pixel(*evidence.chosen, values.shape, zoom), 20, MARK, 4)
         labels.append(Label("chosen", MARK))
-    return titled(image, evidence.title, labels)
+    return titled(image, title, labels)
 
 
 def _circle(image: Rgb, at: tuple[int, int], radius_px: int, colour: Colour, thickness_px: int) -> None:

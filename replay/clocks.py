@@ -133,10 +133,11 @@ def frames(robots: Sequence[str], frame_ids: Mapping[str, str], merged_frame: st
     """Return each robot's map frame for the outputs.
 
     It is the recorded one, its leading slash stripped, where that is unique in the run; else the robot's name and
-    the frame, as ``r1/map``.
+    the frame, as ``r1/map``. Of a name that is no text, as of a file, what no message can hold is escaped.
     """
     bare = {robot: frame_ids.get(robot, "").lstrip("/") for robot in robots}
-    prefixed = {robot: f"{robot}/{frame or 'map'}" for robot, frame in bare.items()}
+    named = {robot: robot.encode(errors="backslashreplace").decode() for robot in robots}
+    prefixed = {robot: f"{named[robot]}/{frame or 'map'}" for robot, frame in bare.items()}
     taken = Counter([*bare.values(), *prefixed.values(), merged_frame])
     return {robot: frame if frame and taken[frame] == 1 else prefixed[robot] for robot, frame in bare.items()}
 

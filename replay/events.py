@@ -149,7 +149,7 @@ class Merged:
     result
         All that the merger knows now.
     report
-        The report as of now, in the form that is written.
+        The report as of now, in the form that is written; of its history, what changed at this time.
     pictures
         Intermediate images that are due, rendered once for all sinks.
     done, total

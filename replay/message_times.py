@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from replay.clocks import stamp_ns
 from replay.events import Noted, Skipped
 from replay.feeds import Content, Feed, Tally
@@ -10,6 +12,9 @@ from replay.options import NS_PER_S
 from replay.sources.base import RawMessage
 from replay.stamps import LAST_NS, Stamp, StampCheck
 from replay.words import moment
+
+MOST_PUT_BACK = 20
+"""So often it is said of a topic that its clock was put back."""
 
 
 class MessageTimes:
@@ -31,6 +36,7 @@ class MessageTimes:
         self._leads_ns = {topic: lead_ns + feed.offsets_ns[topic] for topic, lead_ns in feed.leads_ns.items()}
         self._checks = {topic: StampCheck(feed.leads_ns.get(topic)) for topic in feed.clocks}
         self._doubted: set[str] = set()
+        self._put_back: Counter[str] = Counter()
         self._notes: list[Noted] = []
         self.newest_ns = feed.untimed_ns
 
@@ -81,12 +87,21 @@ class MessageTimes:
         before_ns = check.put_back_ns
         if own_ns <= LAST_NS and check.believes(stamp):
             if check.put_back_ns > before_ns:
-                back_s = (check.put_back_ns - before_ns) / NS_PER_S
-                self._note(raw, f"the clock of its headers was put back by {back_s:.0f} s: it is taken to have gone on")
+                self._say_put_back(raw, check.put_back_ns - before_ns)
             return True
         if raw.log_time_ns <= LAST_NS:
             self._doubt(raw, stamp)
         return False
+
+    def _say_put_back(self, raw: RawMessage, back_ns: int) -> None:
+        """Note that a clock was put back, at most a few times: every report has all notes."""
+        self._put_back[raw.topic] += 1
+        if self._put_back[raw.topic] > MOST_PUT_BACK:
+            return
+        said = f"the clock of its headers was put back by {back_ns / NS_PER_S:.0f} s: it is taken to have gone on"
+        if self._put_back[raw.topic] == MOST_PUT_BACK:
+            said += "; if it is put back once more, that is not said again"
+        self._note(raw, said)
 
     def _doubt(self, raw: RawMessage, stamp: Stamp) -> None:
         self._tally.bad_stamps += 1

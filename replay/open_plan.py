@@ -71,6 +71,7 @@ def _plan(sources: list[Source], options: RunOptions) -> Plan:
         transform_feeds(sources, probes, offsets, options.clock) if options.use_tf else None,
         mapped,
         partial(feeds_of, probes=probes, offsets_ns=offsets, choice=options.clock),
+        tuple(run.robot for run in options.runs),
     )
 
 

@@ -93,7 +93,7 @@ def events(plan: Plan, options: RunOptions, written: OutputOptions | None = None
             now = report.build(stamp_ns, result, inputs)
             yield Merged(stamp_ns, result, now, pictures, timing, done, total, moved, trajectories.remarks())
     yield from _noted(report, beliefs.missed())
-    final = report.build(stamp_ns, merger.result, plan.describe_inputs(tallies))
+    final = report.build(stamp_ns, merger.result, plan.describe_inputs(tallies), is_last=True)
     if stamp_ns is None:
         raise none_used([str(run.path) for run in options.runs], {item.topic for item in plan.robots}, losses_of(final))
     yield Finished(final)

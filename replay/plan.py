@@ -36,6 +36,8 @@ class Plan:
         The robots of which there is a map that can be used.
     feeds_of_transforms
         Returns what is read of the transforms of one input, opened once more, given its index: for who looks on.
+    said_of
+        Of each input, the robot that it was said to be of; None where that was not said.
     """
 
     infos: tuple[SourceInfo, ...]
@@ -46,6 +48,7 @@ class Plan:
     transform_feeds: tuple[Feed, ...] | None
     mapped: frozenset[str]
     feeds_of_transforms: Callable[[int, Source], tuple[Feed, ...]]
+    said_of: tuple[str | None, ...]
 
     def input_bytes(self, index: int) -> int:
         """Return how large an input is."""
@@ -88,6 +91,7 @@ class Plan:
                 "name": feed.source.path.name,
                 "format": info.format,
                 "size_bytes": _size_bytes(feed.source.path),
+                "said_of": said_of,
                 "robots": sorted(set(feed.robot_of.values())),
                 "clocks": dict(sorted(feed.clocks.items())),
                 "offsets_ns": dict(sorted(feed.offsets_ns.items())),
@@ -102,7 +106,9 @@ class Plan:
                     for topic in each.robot_of
                 },
             }
-            for feed, info, tally in zip(self.feeds, self.infos, read[: len(self.feeds)], strict=True)
+            for feed, info, said_of, tally in zip(
+                self.feeds, self.infos, self.said_of, read[: len(self.feeds)], strict=True
+            )
         )
 
 

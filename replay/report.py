@@ -52,6 +52,7 @@ class ReportBuilder:
         self._listing = Listing()
         self._first_merged_ns: dict[str, int] = {}
         self._history: list[Json] = []
+        self._told = 0
         self._notes: list[Json] = []
         self._priors: Mapping[str, Prior] = {}
         self._searched: dict[Pair, Json] = {}
@@ -88,6 +89,7 @@ class ReportBuilder:
         """Take in what a tick brought, and what was believed of the robots' places before it."""
         self._first_ns = stamp_ns if self._first_ns is None else self._first_ns
         self._priors = priors or {}
+        self._told = len(self._history)
         self._updates.update(result.updated)
         for change in result.changes:
             if change.kind is ChangeKind.PLACED:
@@ -105,9 +107,16 @@ class ReportBuilder:
         for pair, trigger in result.searched.items():
             self._searched[pair] = {"stamp_ns": stamp_ns, "trigger": str(trigger)}
 
-    def build(self, stamp_ns: int | None, result: MergeResult, inputs: Sequence[Mapping[str, Any]]) -> Report:
-        """Return the report as of now."""
+    def build(
+        self, stamp_ns: int | None, result: MergeResult, inputs: Sequence[Mapping[str, Any]], *, is_last: bool = False
+    ) -> Report:
+        """Return the report as of now.
+
+        Its history is that of the last tick, for with all of it the reports of a run would grow with the square of its
+        ticks; with ``is_last`` it is all of it.
+        """
         names = [str(item["name"]) for item in inputs]
+        told = 0 if is_last else self._told
         return {
             "schema": SCHEMA,
             "version": self._version,
@@ -121,7 +130,8 @@ class ReportBuilder:
                 {**_pair(pair, match, result.priors.get(pair)), "searched": self._searched.get(pair)}
                 for pair, match in result.pairs.items()
             ],
-            "history": list(self._history),
+            "history": self._history[told:],
+            "history_before": told,
             "notes": list(self._notes),
             "updates": self._updates.total(),
             "skipped": dict(sorted((+self._skipped).items())),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -112,27 +112,35 @@ def _refuse_recording(path: Path) -> None:
 
 
 def _from_mcap(path: Path, at: TimeBound | None) -> Report:
-    last: Report | None = None
     with _ReportFile(path, most_bytes=MOST_BYTES) as file:
         if not any(topic.name == REPORT_TOPIC for topic in file.info.topics):
             raise InputError(f"{path}: it holds no {REPORT_TOPIC}; {_EXPECTED}; to make one: replay merge {path}")
-        for report in _reports(file):
-            if at is not None and report["stamp_ns"] is not None and report["stamp_ns"] > _bound_ns(path, report, at):
-                break
-            last = report
+        last = found = _latest(file)
+        if last is not None and at is not None and last["stamp_ns"] is not None:
+            bound_ns = _bound_ns(path, last, at)
+            found = last if last["stamp_ns"] <= bound_ns else _latest(file, bound_ns)
         losses = file.losses.all
     if losses:
         raise InputError(
             f"{path}: {losses[0].place}: {losses[0].detail}; its last report may be lost: give OUT.json, or merge again"
         )
-    if last is None:
-        raise InputError(f"{path}: {'there is no report' if at is None else 'the run begins after that time'}")
-    return last
+    if last is None or found is None:
+        raise InputError(f"{path}: {'there is no report' if last is None else 'the run begins after that time'}")
+    return found if found is last else _with_history(found, last)
 
 
-def _reports(file: McapFile) -> Iterator[Report]:
-    for message in file.messages([REPORT_TOPIC]):
-        yield _parsed(file.path, bytes(message.data))
+def _latest(file: McapFile, until_ns: int | None = None) -> Report | None:
+    """Return the last report up to a time, found by its log time, so that no other one must be parsed."""
+    message = file.latest([REPORT_TOPIC], until_ns)
+    return None if message is None else _parsed(file.path, bytes(message.data))
+
+
+def _with_history(report: Report, final: Report) -> Report:
+    """Return a report of a time before the end with all of the history until then, of which it holds the last part."""
+    if final.get("history_before") != 0 or "history_before" not in report:
+        return report  # of an older version, or of a run that did not end
+    until = report["history_before"] + len(report["history"])
+    return {**report, "history": final["history"][:until], "history_before": 0}
 
 
 def _bound_ns(path: Path, report: Report, at: TimeBound) -> int:

@@ -62,14 +62,15 @@ def namespace(topic: str) -> list[str]:
 def file_names(runs: Sequence[RunPath]) -> list[str]:
     """Name robots by their files where nothing else does: two of one name have their folder's name in front."""
     paths = [run.path.resolve() for run in runs]
-    stems = [_stem(path.name) for path in paths]
+    stems = [stem_of(path.name) for path in paths]
     return [
-        f"{_stem(path.parent.name)}_{stem}" if stems.count(stem) > 1 else stem
+        f"{stem_of(path.parent.name)}_{stem}" if stems.count(stem) > 1 else stem
         for path, stem in zip(paths, stems, strict=True)
     ]
 
 
-def _stem(name: str) -> str:
+def stem_of(name: str) -> str:
+    """Return a robot's name from that of a file or folder."""
     for suffix in _SUFFIXES:
         name = name.removesuffix(suffix)
     return re.sub(r"[^A-Za-z0-9_.-]", "_", name)

@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
 import html5lib
 
+from replay.events import Event
 from replay.html.page import page
 from replay.html.story import StoryTeller
+from replay.options import RunOptions
+from replay.pipeline import merge
 from tests.scenarios import events_of
 
 
 def page_of(scenario: str) -> str:
     """Return the page of a scenario."""
+    return _told(events_of(scenario))
+
+
+def page_of_run(options: RunOptions) -> str:
+    """Return the page of a run."""
+    return _told(merge(options))
+
+
+def _told(events: Iterable[Event]) -> str:
     teller = StoryTeller()
-    stories = [teller.take(event) for event in events_of(scenario)]
+    stories = [teller.take(event) for event in events]
     assert stories[-1] is not None
     return page(stories[-1])
 

@@ -48,6 +48,16 @@ def bare_room() -> Grid:
     return Grid(cells, RESOLUTION_M)
 
 
+def forgetting(robot: str, count: int) -> list[Recorded]:
+    """Return maps, one a second, of which each knows nothing of what the one before it knew: all but the first jump."""
+    found = []
+    for index in range(count):
+        cells = np.full((40, 60), UNKNOWN, np.int8)
+        cells[5:35, slice(2, 28) if index % 2 else slice(32, 58)] = 0
+        found.append(seen(robot, float(index), Grid(cells, RESOLUTION_M)))
+    return found
+
+
 def at(seconds: float) -> int:
     """Return a time of the recordings, in nanoseconds."""
     return START + round(seconds * SECOND)

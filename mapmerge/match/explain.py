@@ -34,7 +34,11 @@ def explained(pair: PairOfMaps, match: Match, config: MergeConfig) -> tuple[Evid
         return (spectra,)
     best = pair.between_grids(match.target_from_source)
     rivals = [pair.between_grids(rival.target_from_source) for rival in match.rivals]
-    return (spectra, _surface(pair, best, rivals, config.search), _overlay(pair, best, config))
+    surface = _surface(pair, best, rivals, config.search)
+    # said as the placement is: of the map frames, and of the pair in the order in which it was given
+    yaw_rad = match.target_from_source.yaw_rad
+    surface = replace(surface, turn_rad=-yaw_rad if pair.swapped else yaw_rad)
+    return (spectra, surface, _overlay(pair, best, config))
 
 
 def _spectra(pair: PairOfMaps, config: SearchConfig) -> CurvesEvidence:
@@ -55,7 +59,7 @@ def _spectra(pair: PairOfMaps, config: SearchConfig) -> CurvesEvidence:
     )
 
 
-def _surface(pair: PairOfMaps, best: Sim2, rivals: list[Sim2], config: SearchConfig) -> Evidence:
+def _surface(pair: PairOfMaps, best: Sim2, rivals: list[Sim2], config: SearchConfig) -> SurfaceEvidence:
     """Return the surface at the rotation of the best placement, with all rivals of about this rotation."""
     turn = Sim2(0.0, 0.0, best.yaw_rad, best.scale)
     translations = TranslationSearch(
@@ -68,7 +72,7 @@ def _surface(pair: PairOfMaps, best: Sim2, rivals: list[Sim2], config: SearchCon
     surface = translations.surfaces(turn)[0]
     return SurfaceEvidence(
         step="correlation_surface",
-        title=f"Correlation of walls and free space, one map turned by {math.degrees(turn.yaw_rad):.1f}°",
+        title="Correlation of walls and free space",
         values=surface.values,
         marks=tuple(
             surface.index(rival) for rival in rivals if abs(wrap_angle(rival.yaw_rad - best.yaw_rad)) < _SAME_TURN_RAD

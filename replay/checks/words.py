@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from replay.checks.findings import Finding
+from replay.markdown import inline
 from replay.plain_text import plain
 from replay.words import counted
 
 HOLDS, FAILS = "✓", "✗"
 PLAIN_HOLDS, PLAIN_FAILS = "ok  ", "FAIL"
-_MARKDOWN = str.maketrans({each: f"\\{each}" for each in "\\`*_{}[]<>|#~"})
 
 
 def lines(found: Sequence[Finding], *, is_ascii: bool = False) -> Iterator[str]:
@@ -38,18 +38,14 @@ def summary(found: Sequence[Finding], title: str) -> str:
     """Return a section of Markdown: how many hold, and a table, what fails first."""
     rows = sorted(found, key=lambda item: item.holds)
     table = [
-        f"| {FAILS if not item.holds else HOLDS} | {_cell(item.subject)} | {_cell(item.expected)} | "
-        f"{_cell(item.found)} |"
+        f"| {FAILS if not item.holds else HOLDS} | {inline(item.subject)} | {inline(item.expected)} | "
+        f"{inline(item.found)} |"
         for item in rows
     ]
     head = ["", "| | robot | expected | found |", "|---|---|---|---|"]
-    return "\n".join([f"### replay check: {_cell(title)}", "", _cell(count(found)), *head, *table, ""]) + "\n"
+    return "\n".join([f"### replay check: {inline(title)}", "", inline(count(found)), *head, *table, ""]) + "\n"
 
 
 def error_summary(message: str, title: str) -> str:
     """Return a section of Markdown that says why nothing could be checked."""
-    return f"### replay check: {_cell(title)}\n\n{_cell(FAILS)} nothing was checked: {_cell(message)}\n\n"
-
-
-def _cell(text: str) -> str:
-    return plain(text).translate(_MARKDOWN)
+    return f"### replay check: {inline(title)}\n\n{inline(FAILS)} nothing was checked: {inline(message)}\n\n"

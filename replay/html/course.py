@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -17,7 +18,10 @@ from replay.options import NS_PER_S
 from replay.words import STATUS_WORDS
 
 MOST_MARKS = 60
+"""So many marks have room on a lane; of a robot of which more was decided, those of one time are one mark."""
 MOST_ENTRIES = 400
+
+_MOST_COUNTED = 99
 
 SIGNS = {ChangeKind.PLACED: "▲", ChangeKind.MOVED: "◆", ChangeKind.WITHDRAWN: "▼", ChangeKind.JUMPED: "✱"}
 
@@ -34,12 +38,13 @@ class Phase:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A decision in the course of a run."""
+    """A decision in the course of a run, or several that stand where one has room."""
 
     sign: str
     kind: str
     words: str
     at: float
+    count: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,13 +68,22 @@ class Entry:
     time: str
     sign: str
     kind: str
-    member: Member
     words: str
 
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """The course of a run; `left_out` decisions in the middle are not listed, `otherwise` is what they do not say."""
+    """The course of a run.
+
+    Parameters
+    ----------
+    first, last, left_out
+        The log; so many decisions in the middle are not listed.
+    otherwise
+        What it does not say.
+    unmarked
+        So many decisions in the middle are on no lane.
+    """
 
     lanes: tuple[Lane, ...]
     times: tuple[Mark, ...]
@@ -77,6 +91,12 @@ class Course:
     last: tuple[Entry, ...]
     left_out: int
     otherwise: str | None
+    unmarked: int
+
+    @property
+    def has_groups(self) -> bool:
+        """Whether any mark stands for several decisions."""
+        return any(event.count > 1 for lane in self.lanes for event in lane.events)
 
 
 def course(story: Story) -> Course | None:
@@ -91,7 +111,8 @@ def course(story: Story) -> Course | None:
     entries = [_entry(story, decision) for decision in story.decisions]
     first, last = (entries, []) if len(entries) <= MOST_ENTRIES else _ends(entries)
     left_out = story.decisions_left_out + len(entries) - len(first) - len(last)
-    return Course(lanes, time_marks(over), tuple(first), tuple(last), left_out, linked_otherwise(story.report))
+    otherwise, unmarked = linked_otherwise(story.report), story.decisions_left_out
+    return Course(lanes, time_marks(over), tuple(first), tuple(last), left_out, otherwise, unmarked)
 
 
 def _ends(entries: Sequence[Entry]) -> tuple[list[Entry], list[Entry]]:
@@ -115,15 +136,32 @@ def _phases(story: Story, member: Member, over: Axis) -> Iterator[Phase]:
 
 
 def _events(story: Story, member: Member, over: Axis) -> Iterator[Event]:
+    """Yield a robot's marks; of very many decisions, one for those of each part of the time that has room for one."""
     own = [decision for decision in story.decisions if decision.robot == member.robot]
-    for decision in own[:MOST_MARKS]:
-        since_ns = decision.stamp_ns - story.first_ns
-        at = round(over.share(since_ns / NS_PER_S) * 100.0, 2)
-        words = f"{decision.kind} at {seconds(since_ns)}"
-        yield Event(SIGNS[ChangeKind(decision.kind)], decision.kind, words, at)
+    places = [over.share((decision.stamp_ns - story.first_ns) / NS_PER_S) for decision in own]
+    if len(own) <= MOST_MARKS:
+        groups = [[item] for item in zip(places, own, strict=True)]
+    else:
+        parts = groupby(zip(places, own, strict=True), key=lambda item: min(MOST_MARKS - 1, int(item[0] * MOST_MARKS)))
+        groups = [list(group) for _, group in parts]
+    for group in groups:
+        at = sum(place for place, _ in group) / len(group)
+        yield _mark(story, [decision for _, decision in group], round(at * 100.0, 2))
+
+
+def _mark(story: Story, decided: Sequence[Decision], at: float) -> Event:
+    begin, end = (seconds(decision.stamp_ns - story.first_ns) for decision in (decided[0], decided[-1]))
+    kind = decided[0].kind
+    if len(decided) == 1:
+        return Event(SIGNS[ChangeKind(kind)], kind, f"{kind} at {begin}", at)
+    counts = Counter(decision.kind for decision in decided)
+    words = ", ".join(f"{count} times {each}" if count > 1 else each for each, count in counts.items())
+    sign = str(len(decided)) if len(decided) <= _MOST_COUNTED else "⋯"
+    when = f"at {begin}" if begin == end else f"from {begin} to {end}"
+    return Event(sign, kind if len(counts) == 1 else "several", f"{words} {when}", at, len(decided))
 
 
 def _entry(story: Story, decision: Decision) -> Entry:
     time = seconds(decision.stamp_ns - story.first_ns)
     sign = SIGNS[ChangeKind(decision.kind)]
-    return Entry(time, sign, decision.kind, story.member(decision.robot), decision.words)
+    return Entry(time, sign, decision.kind, decision.words)

@@ -32,7 +32,6 @@ def page(story: Story) -> str:
         script_hash=_hash(script),
         verdict=verdict.verdict(story),
         key_figures=list(_key_figures(story)),
-        members=list(story.roster.values()),
         robots=robots.rows(story),
         is_scaled=story.settings["merge"]["scale"] == "free",
         stack=maps.merged_stack(story),
@@ -66,12 +65,9 @@ def _key_figures(story: Story) -> Iterator[tuple[str, str]]:
     robots_said = report["robots"].values()
     if len(story.robots) > 1:
         yield "maps merged", f"{_merged(story)} of {len(story.robots)}"
-    sure = [values["confidence"] for values in robots_said if values["confidence"] is not None]
-    agreeing = [
-        values["acceptance"]
-        for values in robots_said
-        if values["acceptance"] is not None and values["status"] == Status.MERGED
-    ]
+    merged = [values for values in robots_said if values["status"] == Status.MERGED]
+    sure = [values["confidence"] for values in merged if values["confidence"] is not None]
+    agreeing = [values["acceptance"] for values in merged if values["acceptance"] is not None]
     if sure:
         yield "least confidence", percent(min(sure))
     if agreeing:

@@ -86,11 +86,6 @@ class Plot:
     marks: tuple[Mark, ...]
     limit: Mark | None
 
-    @property
-    def has_refused(self) -> bool:
-        """Whether anything in it was refused."""
-        return any(line.refused for line in self.lines)
-
 
 @dataclass(frozen=True, slots=True)
 class Plots:

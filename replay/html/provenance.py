@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 from replay.figures import size
 from replay.html.story import Story
 from replay.options import DEFAULT_REORDER_WINDOW_NS, NS_PER_S, OutputOptions, RunOptions
+from replay.robot_names import stem_of
 from replay.words import moment
 
 _FLAGS_OF_MERGE = {"merge.method", "merge.scale", "merge.verify.min_confidence"}
@@ -89,26 +90,35 @@ def provenance(story: Story) -> Provenance:
 
 def command(story: Story) -> tuple[str | None, str]:
     """Return the command that gives this outcome in the folder of its inputs or, if there is none, why."""
-    names = [str(item["name"]) for item in story.report["inputs"]]
+    inputs = story.report["inputs"]
+    names = [str(item["name"]) for item in inputs]
     if len(set(names)) < len(names):
         return None, "Several recordings have the same name, and lay in different folders."
+    if not all(names):
+        return None, "A recording was given as a folder without its name."
+    if any(_is_named_by_folder(item, inputs) for item in inputs):
+        return None, "Robots are called after the folders in which their recordings lay."
     found = shlex.join(["replay", "merge", *_runs(story), *_flags(story)])
     if not found.isprintable():
         return None, "A name in it holds characters that cannot be typed."
     return found, ""
 
 
+def _is_named_by_folder(item: Mapping[str, Any], inputs: Sequence[Mapping[str, Any]]) -> bool:
+    """Tell whether a robot was named by its file, and by the folder of that, as another file has the same stem."""
+    stem = stem_of(item["name"])
+    alike = sum(stem_of(other["name"]) == stem for other in inputs)
+    return alike > 1 and item["said_of"] is None and any(robot.endswith(f"_{stem}") for robot in item["robots"])
+
+
 def _runs(story: Story) -> Iterator[str]:
-    """Yield the recordings; each as its robot's where several are of one robot each."""
-    names = [str(item["name"]) for item in story.report["inputs"]]
-    of: dict[int, list[str]] = {}
-    for robot in story.robots:
-        for index in robot.inputs:
-            of.setdefault(index, []).append(robot.robot)
-    is_each_of_one = len(names) > 1 and all(len(of.get(index, ())) == 1 for index in range(len(names)))
-    for index, name in enumerate(names):
-        path = f"./{name}" if name.startswith("-") else name  # which would be taken for a flag
-        yield f"{of[index][0]}={name}" if is_each_of_one else path
+    """Yield the recordings as they were given, for what was said of one decides what its robots are called."""
+    for item in story.report["inputs"]:
+        name = str(item["name"])
+        if item["said_of"] is not None:
+            yield f"{item['said_of']}={name}"
+        else:
+            yield f"./{name}" if name.startswith("-") else name  # which would be taken for a flag
 
 
 def _flags(story: Story) -> Iterator[str]:

@@ -29,7 +29,6 @@ class Row:
     first_merged: str
     updates: int
     reason: str
-    topic: str
     is_placed: bool
 
 
@@ -55,7 +54,6 @@ def rows(story: Story) -> list[Row]:
                 NO_FIGURE if first_ns is None else seconds(first_ns - story.first_ns),
                 values["updates"],
                 values["reason"]["message"],
-                values["map_topic"],
                 pose is not None,
             )
         )

@@ -133,8 +133,8 @@ class McapSink(McapOutput):
         if self._pending_report is None:
             return
         (stamp_ns, report), self._pending_report = self._pending_report, None
-        said = {**report, "stamp_ns": None}
-        if is_last or said != self._said:
+        said = {**report, "stamp_ns": None, "history": [], "history_before": 0}
+        if is_last or report["history"] or said != self._said:
             self._channels.report(stamp_ns, report)
         self._said = said
 

@@ -126,14 +126,15 @@ def _time_axis(span_ns: int, more: float) -> rrb.TimeAxis | None:
 
 
 def _decisions() -> Part:
-    # The column of times is too narrow for a time, and is in its own units: entries begin with theirs.
+    # Such a view shows all entries at any time, whatever range of time it is given: so its name says so. The column of
+    # times is too narrow for a time, and is in its own units: entries begin with theirs.
     hidden = [rrb.encodings.TimelineColumn(ELAPSED, visible=False)]
     columns = rrb.TextLogColumns(timeline_columns=hidden, text_log_columns=["LogLevel", "Body"])
     return rrb.Vertical(
-        rrb.TextLogView(name="What was decided, and why", origin=_path(DECISIONS), columns=columns),
+        rrb.TextLogView(name="What was decided in the whole run, and why", origin=_path(DECISIONS), columns=columns),
         rrb.Horizontal(
-            rrb.TextDocumentView(name="Robots", origin=_path(ROBOTS)),
-            rrb.TextDocumentView(name="Skipped", origin=_path(SKIPPED)),
+            rrb.TextDocumentView(name="Robots at this time", origin=_path(ROBOTS)),
+            rrb.TextDocumentView(name="Skipped until this time", origin=_path(SKIPPED)),
             rrb.TextDocumentView(name="Inputs and settings", origin=_path(ABOUT)),
             column_shares=[5, 4, 4],
         ),

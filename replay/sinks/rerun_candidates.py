@@ -9,7 +9,7 @@ from mapmerge.outcome import Pair
 from mapmerge.watch import Trigger
 from replay.events import Report
 from replay.figures import NO_FIGURE, area, degrees, fixed, percent, share
-from replay.sinks.rerun_text import cell, paragraph, table
+from replay.markdown import inline, table
 
 _COLUMNS = ("", "x, m", "y, m", "yaw, °", "score, m", "as likely as the best")
 _MOST = 12
@@ -26,9 +26,10 @@ def candidates(report: Report, pair: Pair) -> str:
         Its robots, target first.
     """
     match = next(item for item in report["pairs"] if (item["a"], item["b"]) == pair)
-    target, source = (cell(name) for name in pair)
+    target, source = (inline(name) for name in pair)
     verdict = "accepted" if match["accepted"] else "**refused**"
-    parts = [f"# {source} on {target}: {verdict}", paragraph(match["reason"]["message"])]
+    # either robot's page may show this pair, and its reason names the other one
+    parts = [f"# {target} and {source}: {verdict}", inline(match["reason"]["message"])]
     parts.append(_figures(match["scores"], match["confidence"]))
     if match["a_from_b"] is None:
         return "\n\n".join([*parts, "No placement was found at all."]) + "\n"

@@ -30,7 +30,7 @@ from replay.sinks.rerun_paths import PathScene
 from replay.sinks.rerun_plots import Plots
 from replay.sinks.rerun_status import Statuses
 from replay.sinks.rerun_stream import APPLICATION, RrdStream
-from replay.sinks.rerun_summary import Said, legend, summary
+from replay.sinks.rerun_summary import Said, Setbacks, legend, summary
 
 _MARKDOWN = rr.MediaType.MARKDOWN
 
@@ -92,6 +92,7 @@ class _Writer:
         self._steps: dict[str, list[str]] = {}
         self._waiting: list[Entry] = []
         self._said: list[Said] = []
+        self._setbacks = Setbacks()
         self._pages: dict[tuple[str, ...], str] = {}
         self._start_ns: int | None = None
         self._stamp_ns = 0
@@ -150,6 +151,7 @@ class _Writer:
         self._say_waiting()
         for entry in (*decisions(event.result), *text.remarks(event)):
             self._say(entry)
+        self._setbacks.take(event.report)
         self._show_pages(event.report)
         self._lay_out_live()
 
@@ -177,7 +179,8 @@ class _Writer:
                 self._show_page(self._robots[robot].candidates, candidates(event.report, pair))
 
     def _show_pages(self, report: Report, *, is_last: bool = False) -> None:
-        self._show_page(SUMMARY, summary(report, list(self._robots.values()), self._said, is_last=is_last))
+        robots = list(self._robots.values())
+        self._show_page(SUMMARY, summary(report, robots, self._said, self._setbacks, is_last=is_last))
         self._show_page(ROBOTS, text.robots_table(report))
         self._show_page(SKIPPED, text.skipped_table(report))
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from replay.decisions import INFO, WARN, Entry, linked_otherwise
 from replay.events import Merged, Noted, Report, Skipped
 from replay.figures import NO_FIGURE, area, degrees, fixed, percent, share
-from replay.plain_text import plain, plain_json
+from replay.markdown import inline, table
+from replay.plain_text import plain_json
 from replay.words import lost, merged_of
 
-_MARKS = re.compile(r"[\\`*_\[\]<>#]")
 _COLUMNS = ("robot", "status", "x, m", "y, m", "yaw, °", "acceptance", "overlap", "confidence")
 
 
@@ -50,7 +49,7 @@ def outcome(report: Report) -> Iterator[Entry]:
 def robots_table(report: Report) -> str:
     """Return the robots as a table in Markdown, and why each is where it is."""
     robots = report["robots"].items()
-    reasons = [f"- **{cell(robot)}**: {paragraph(values['reason']['message'])}" for robot, values in robots]
+    reasons = [f"- **{inline(robot)}**: {inline(values['reason']['message'])}" for robot, values in robots]
     return "\n\n".join([table(_COLUMNS, [_row(robot, values) for robot, values in robots]), "\n".join(reasons)]) + "\n"
 
 
@@ -60,16 +59,16 @@ def skipped_table(report: Report) -> str:
     if not places:
         return "Nothing was skipped: all messages with maps were used.\n"
     rows = [
-        (cell(item["cause"]), _count(item["messages"]), cell(item["topic"] or item["place"]), cell(item["input"]))
+        (inline(item["cause"]), _count(item["messages"]), inline(item["topic"] or item["place"]), inline(item["input"]))
         for item in places
     ]
-    details = [f"- {cell(item['topic'] or item['place'])}: {paragraph(item['detail'])}" for item in places]
+    details = [f"- {inline(item['topic'] or item['place'])}: {inline(item['detail'])}" for item in places]
     return "\n\n".join([table(("cause", "messages", "where", "input"), rows), "\n".join(details)]) + "\n"
 
 
 def about(report: Report) -> str:
     """Return inputs and settings in Markdown."""
-    parts = [f"# replay {report['version']}", f"Reference: **{plain(report['reference'])}**", "## Inputs"]
+    parts = [f"# replay {report['version']}", f"Reference: **{inline(report['reference'])}**", "## Inputs"]
     parts += [_block(item) for item in report["inputs"]]
     parts += ["## Settings", _block(report["settings"])]
     return "\n\n".join(parts) + "\n"
@@ -79,22 +78,7 @@ def _row(robot: str, values: Mapping[str, Any]) -> tuple[str, ...]:
     pose = values["merged_from_map"]
     place = (fixed(pose["x_m"], 2), fixed(pose["y_m"], 2), degrees(pose["yaw_rad"])) if pose else (NO_FIGURE,) * 3
     agreement = share(values["acceptance"]), area(values["overlap_m2"]), percent(values["confidence"])
-    return (cell(robot), cell(values["status"]), *place, *agreement)
-
-
-def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table in Markdown, of text that stays in its cells."""
-    return "\n".join("| " + " | ".join(row) + " |" for row in (columns, ("---",) * len(columns), *rows))
-
-
-def cell(text: str) -> str:
-    """Return text that stays in its cell of a table."""
-    return paragraph(text).replace("|", "\\|")
-
-
-def paragraph(text: str) -> str:
-    """Return text that is read as it is, and on one line."""
-    return _MARKS.sub(r"\\\g<0>", plain(text).replace("\n", " "))
+    return (inline(robot), inline(values["status"]), *place, *agreement)
 
 
 def _count(messages: int | None) -> str:

@@ -146,6 +146,20 @@ def test_a_picture_in_the_colours_of_rviz(replay: Program, outcome: Path) -> Non
     assert (image[cells == 100] == 0).all()
 
 
+@pytest.mark.parametrize("fails", [lambda _: (False, None), lambda encode: encode(".png", np.zeros((2, 0)))])
+@pytest.mark.parametrize("flags", [("--to", "png"), ("--mode", "scale")])
+def test_a_picture_that_cannot_be_made_is_an_error_of_one_line(
+    replay: Program, outcome: Path, monkeypatch: pytest.MonkeyPatch, fails: Any, flags: tuple[str, ...]
+) -> None:
+    encode = cv2.imencode
+    monkeypatch.setattr("replay.export.image.cv2.imencode", lambda *_: fails(encode))
+    before = sorted(replay.folder.iterdir())
+    ran = replay("export", outcome, *flags, "-o", "floor")
+    assert ran.status == 3
+    assert "the picture cannot be made" in ran.error
+    assert sorted(replay.folder.iterdir()) == before
+
+
 def test_robots_own_maps_lie_on_the_merged_one(replay: Program, outcome: Path, two: Path) -> None:
     merged = maps(outcome)[-1].grid
     assert replay("export", outcome, "--robots", "r1,r2", "--mode", "raw").status == 0

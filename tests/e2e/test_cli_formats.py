@@ -109,6 +109,7 @@ class TestInputs:
             "name": "two.mcap",
             "format": "mcap",
             "size_bytes": two.stat().st_size,
+            "said_of": None,
             "robots": ["r1", "r2"],
             "clocks": {"/r1/map": "header", "/r2/map": "header"},
             "offsets_ns": {"/r1/map": 0, "/r2/map": 0},

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -68,3 +69,17 @@ def test_each_is_rendered_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("replay.gallery.render", lambda evidence, _: rendered.append(evidence) or blank(evidence.step))
     shown("changed")
     assert len(rendered) == 3 * len(STEPS)
+
+
+@pytest.mark.parametrize("robots", [("r1", "r2"), ("r2", "r1")])
+@pytest.mark.parametrize("larger", ["r1", "r2"])
+def test_the_surface_says_which_map_is_turned_as_its_placement_does(robots: tuple[str, str], larger: str) -> None:
+    """In whichever order the maps were matched."""
+    merger = Merger(robots)
+    gallery = Gallery("changed", merger.explain)
+    result = merger.step({robot: flat_map(robot, 9.0 if robot == larger else 7.0) for robot in robots})
+    (title,) = (item.picture.title for item in gallery.due(result) if item.picture.step == "correlation_surface")
+    pose = result.robots[robots[1]].merged_from_map
+    assert pose is not None
+    turned = f"{robots[1]} turned by {math.degrees(pose.yaw_rad):.1f}° on {robots[0]}"
+    assert title == f"Correlation of walls and free space, {turned}"

@@ -5,16 +5,22 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from mapmerge.config import MergeConfig, VerifyConfig
 from replay.html.losses import MEANINGS
 from replay.html.roster import Member
+from replay.options import RunOptions
 from replay.palette import robot_colour
+from replay.runs import RunPath
 from replay.skip_cause import SkipCause
-from tests.pages import Page, page_of
+from tests.bags import write_mcap
+from tests.pages import Page, page_of, page_of_run
+from tests.runs import two_robots
 from tests.scenarios import SCENARIOS
 
 SECTIONS = ("verdict", "robots", "map", "pairs", "refused", "plots", "decisions", "losses", "settings", "provenance")
@@ -98,12 +104,29 @@ def test_who_is_not_merged_is_told_with_why_and_what_to_do() -> None:
     assert robots == {"r1": "reference", "r2": "merged", "r3": "not merged"}
 
 
-def test_the_row_and_the_reason_do_not_contradict_each_other() -> None:
-    found = Page(page_of("three_robots_one_unplaced"))
-    rows = {row[0]: row for row in found.rows("robots")}
-    share = re.search(r"([\d.]+) m² of ground", rows["r3"][-1])
-    if share:
-        assert any(cell.startswith(f"{share[1]} m²") for cell in rows["r3"])
+@pytest.mark.parametrize(("least_m2", "status"), [(6.0, "merged"), (60.0, "not merged")])
+def test_the_row_and_the_reason_do_not_contradict_each_other(tmp_path: Path, least_m2: float, status: str) -> None:
+    """A refused placement has figures too."""
+    path = write_mcap(tmp_path / "run.mcap", two_robots())
+    config = MergeConfig(verify=VerifyConfig(min_overlap_m2=least_m2))
+    found = Page(page_of_run(RunOptions((RunPath(None, path),), merge=config)))
+    row = next(row for row in found.rows("robots") if row[0] == "r2")
+    assert row[1] == status
+    said = re.search(r"([\d.]+) m² (?:of ground|overlap)", row[-1])
+    assert said is not None
+    (shown,) = re.findall(r"([\d.]+) m²", " ".join(row[:-1]))
+    assert float(said[1]) == pytest.approx(float(shown), abs=0.5)
+    assert bool(re.search(r"99\.\d+% refused", " ".join(row))) == (status == "not merged")
+    assert ("least confidence" in found.words("verdict")) == (status == "merged")
+
+
+def test_a_pair_is_called_by_both_robots_and_placements_say_their_frame() -> None:
+    """The reason of either robot names the other one, whichever of them the figures take as fixed."""
+    found = Page(page_of("nobody_merged"))
+    assert [row[:2] for row in found.rows("pairs")] == [["r1", "r2"], ["r1", "r3"], ["r2", "r3"]]
+    merged = Page(page_of("merged"))
+    (caption,) = (" ".join("".join(each.itertext()).split()) for each in merged.section("pairs").iter("figcaption"))
+    assert caption.startswith("r1 and r2 accepted")
 
 
 def test_layers_of_the_map_are_those_of_the_placed_robots() -> None:

@@ -11,15 +11,12 @@ import pytest
 
 from mapmerge.raster import Pixels
 from mapmerge.sim2 import IDENTITY, Sim2
-from replay.html.page import page
 from replay.html.roster import Member
-from replay.html.story import StoryTeller
 from replay.html.ways import MOST_POINTS_OF_ONE, PARTS, Way, Ways, ways
 from replay.options import RunOptions
-from replay.pipeline import merge
 from replay.runs import RunPath
 from tests.bags import Recorded, write_mcap
-from tests.pages import Page, page_of
+from tests.pages import Page, page_of, page_of_run
 from tests.runs import (
     bare_room,
     begun_anew,
@@ -47,10 +44,7 @@ def drives(robot: str, first_s: float = 0.0, count: int = 40) -> list[Recorded]:
 def told(path: Path, *parts: list[Recorded]) -> Page:
     """Return the page of a run."""
     options = RunOptions((RunPath(None, write_mcap(path, in_log_order(*parts))),), trajectories="all")
-    teller = StoryTeller()
-    stories = [teller.take(event) for event in merge(options)]
-    assert stories[-1] is not None
-    return Page(page(stories[-1]))
+    return Page(page_of_run(options))
 
 
 def points(path: str) -> list[np.ndarray]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.bags import write_mcap
+from tests.bags import write_mcap, write_rosbag1
 from tests.pages import Page
 from tests.program import in_process_of_its_own
 from tests.runs import growing, two_robots
@@ -26,6 +26,16 @@ def test_recordings_of_one_name_cannot_be_told_from_each_other(tmp_path: Path) -
     told = page(tmp_path, "r1=pa/run.mcap", "r2=pb/run.mcap").words("provenance")
     assert "Several recordings have the same name" in told
     assert "replay merge" not in told
+
+
+def test_robots_that_are_called_after_folders_cannot_be_in_one(tmp_path: Path) -> None:
+    for folder, write in (("alpha", write_mcap), ("bravo", write_rosbag1)):
+        (tmp_path / folder).mkdir()
+        write(tmp_path / folder / ("run.mcap" if write is write_mcap else "run.bag"), growing("r1", topic="/map"))
+    told = page(tmp_path, "alpha/run.mcap", "bravo/run.bag")
+    assert [row[0] for row in told.rows("robots")] == ["alpha_run", "bravo_run"]
+    assert "Robots are called after the folders" in told.words("provenance")
+    assert "replay merge" not in told.words("provenance")
 
 
 @pytest.mark.parametrize("name", ["-d.mcap", "--force", "a b.mcap"])

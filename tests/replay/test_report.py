@@ -30,6 +30,7 @@ INPUT: Mapping[str, Any] = {
     "name": "run.mcap",
     "format": "mcap",
     "size_bytes": 5,
+    "said_of": None,
     "robots": list(ROBOTS),
     "clocks": dict.fromkeys(ROBOTS, "header"),
     "offsets_ns": dict.fromkeys(ROBOTS, 0),
@@ -100,7 +101,8 @@ def test_history() -> None:
         {"r2": flat_map("r2")},
     ]
     reports = reported(*steps)
-    events = [(change["stamp_ns"], change["robot"], change["event"]) for change in reports[-1]["history"]]
+    history = [change for report in reports for change in report["history"]]
+    events = [(change["stamp_ns"], change["robot"], change["event"]) for change in history]
     assert events == [
         (0, "r2", "placed"),
         (1, "r2", "jumped"),
@@ -109,10 +111,26 @@ def test_history() -> None:
         (2, "r2", "withdrawn"),
         (3, "r2", "placed"),
     ]
-    assert [len(report["history"]) for report in reports] == [1, 3, 5, 6]
-    triggers = [change["trigger"] for change in reports[-1]["history"]]
+    # one before the end holds what changed at its time alone, or reports would grow with the square of the ticks
+    assert [len(report["history"]) for report in reports] == [1, 2, 2, 1]
+    assert [report["history_before"] for report in reports] == [0, 1, 3, 5]
+    triggers = [change["trigger"] for change in history]
     assert triggers == ["first", None, "map_jumped", None, "map_jumped", "retry"]
     assert reports[-1]["robots"]["r2"]["first_merged_stamp_ns"] == 0
+
+
+def test_the_last_report_has_all_of_the_history() -> None:
+    report, merger = builder(), Merger(ROBOTS)
+    before: list[Report] = []
+    for stamp_ns, grid in enumerate([flat_map("r2"), begun_anew(flat_map("r2"))]):
+        result = merger.step({"r1": flat_map("r1"), "r2": grid})
+        report.take(stamp_ns, result)
+        before.append(report.build(stamp_ns, result, [INPUT]))
+    last = report.build(1, merger.result, [INPUT], is_last=True)
+    validate(last)
+    assert last["history"] == [change for each in before for change in each["history"]]
+    assert (len(last["history"]), last["history_before"]) == (3, 0)
+    assert {**last, "history": None, "history_before": None} == {**before[-1], "history": None, "history_before": None}
 
 
 def test_pairs() -> None:

@@ -78,7 +78,8 @@ def events_of(
         written = report.build(stamp_ns, result, ({"name": "run.mcap"},))
         found.append(Merged(stamp_ns, result, written, gallery.due(result), Timing(0.1, 0.2), 1, 9))
     last_ns = max(ticks, default=None)
-    return [*found, Finished(report.build(last_ns, merger.result, ({"name": "run.mcap", "sha256": "ab"},)))]
+    final = report.build(last_ns, merger.result, ({"name": "run.mcap", "sha256": "ab"},), is_last=True)
+    return [*found, Finished(final)]
 
 
 @pytest.fixture(scope="module")
@@ -309,6 +310,35 @@ def test_the_table_has_every_robot(recording: Path) -> None:
     assert set(rule) == {"---"}
     assert [row[0] for row in rows] == list(ROBOTS)
     assert [row[1] for row in rows] == ["reference", "merged", "unmerged", "no\\_map"]
+
+
+def test_the_summary_says_the_first_setbacks_and_how_many_more(tmp_path: Path) -> None:
+    maps = [{"r2": bare_room() if index % 2 else flat_map("r2")} for index in range(11)]
+    events = events_of(("r1", "r2"), dict(enumerate([{"r1": flat_map("r1")}, *maps])))
+    pages = Entity(written(tmp_path / "run.rrd", events), "/summary").values("TextDocument:text")
+    wrong = pages[-1].partition("went wrong")[2].partition("### Decisions")[0].strip().splitlines()
+    told = ["- the map of **r2** jumped in its own frame", "- **r2** was withdrawn for some time"]
+    assert [line.partition(":")[0] for line in wrong] == [*told, *told, *told, "- and 4 more"]
+    assert "jumped" not in pages[1]
+
+
+def test_candidates_are_those_of_a_pair_and_say_their_frame(recording: Path) -> None:
+    """The pair is called by both robots: the reason of either names the other one."""
+    pages = Entity(recording, "/evidence/r2/candidates").values("TextDocument:text")
+    assert pages[-1].startswith("# r1 and r2: accepted\n")
+    assert any(page.startswith("# r1 and r2: **refused**\n") for page in pages)
+    assert "Where the map frame of r2 lies in that of r1" in pages[-1]
+
+
+def test_names_in_pages_are_read_as_they_are(tmp_path: Path) -> None:
+    name = "a|b_*c*_#`d`<e>~~f~~{g}"
+    events = events_of(("r1", name), {0: {"r1": flat_map("r1")}})
+    path = written(tmp_path / "run.rrd", events)
+    escaped = re.sub(r"([^\w])", r"\\\1", name).replace("_", "\\_")
+    for page in ("/summary", "/robots"):
+        assert f"**{escaped}**" in Entity(path, page).values("TextDocument:text")[-1]
+    other = written(tmp_path / "other.rrd", events_of((name, "r1"), {0: {"r1": flat_map("r1")}}))
+    assert f"Reference: **{escaped}**" in Entity(other, "/about").values("TextDocument:text")[-1]
 
 
 def test_about_holds_inputs_and_settings(recording: Path) -> None:
@@ -554,7 +584,14 @@ def test_the_viewer_shows_every_tab_at_every_time_without_complaint(
                 assert complaints(client) == []
                 shown |= {view.name for view in client.get_state().views if view.visible}
         client.save_screenshot(str(tmp_path / "shot.png"))
-    assert {"Maps", "Outcome", "Acceptance index", "Placed at yaw, °", "Robots", "Skipped"} <= shown
+    assert {
+        "Maps",
+        "Outcome",
+        "Acceptance index",
+        "Placed at yaw, °",
+        "Robots at this time",
+        "Skipped until this time",
+    } <= shown
     assert ("Candidates" in shown) == (name not in ("empty", "none"))
     assert ("Interest points" in shown) == (name == "paper")
     assert (tmp_path / "shot.png").stat().st_size > 10_000

@@ -56,6 +56,32 @@ def test_with_an_index_the_file_is_not_passed_through(tmp_path: Path, monkeypatc
     assert _times(path) == _expected()
 
 
+@pytest.mark.parametrize(
+    "options", [{}, NO_SUMMARY, NO_INDEX, {"index_types": IndexType.CHUNK}, {"use_chunking": False}]
+)
+def test_the_latest_message_is_the_last_one_up_to_a_time(tmp_path: Path, options: dict[str, Any]) -> None:
+    path = bags.write_mcap(tmp_path / "a.mcap", **options)
+    every = _expected("/r1/map")
+    with mcap_file.McapFile(path) as file:
+        for until_ns, expected in ((None, every[-1]), (every[0], every[0]), (every[-1] - 1, every[-2]), (0, None)):
+            found = file.latest(["/r1/map"], until_ns)
+            assert (found and found.log_time_ns) == expected
+            assert found is None or found.data in [message.data for message in file.messages(["/r1/map"])]
+
+
+def test_for_the_latest_message_one_chunk_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = bags.write_mcap(tmp_path / "a.mcap")
+    loaded: list[int] = []
+    original = mcap_chunk.chunk_content
+    monkeypatch.setattr(
+        chunk_reader, "chunk_content", lambda file, start: (loaded.append(start), original(file, start))[1]
+    )
+    with mcap_file.McapFile(path) as file:
+        assert file.latest(["/r1/map"]) is not None
+    assert len(loaded) == 1
+    assert len(bags.chunks(path)) > 2
+
+
 def test_a_channel_that_is_indexed_in_part_is_passed_through(tmp_path: Path) -> None:
     """A message of an indexed channel lies outside of the chunks; only the statistics know of it."""
     path = bags.write_mcap(tmp_path / "a.mcap")

@@ -10,6 +10,7 @@ from mapmerge.grid import Grid
 from replay.errors import InputError
 from replay.events import Clock, Noted, Skipped
 from replay.feeds import Feed, Tally, Window
+from replay.message_times import MOST_PUT_BACK
 from replay.sources.base import TF_TYPE
 from replay.stamps import LAST_NS
 from replay.timeline import _MOST_HELD, Tick, Transforms, ticks
@@ -215,6 +216,15 @@ class TestStamps:
         said = [item.message for item in found if isinstance(item, Noted)]
         assert len(said) == 2
         assert f"was put back by {back_s:.0f} s" in said[1]
+
+    def test_a_clock_that_is_put_back_all_the_time_is_named_a_few_times(self) -> None:
+        stamps = [10.0 * (index % 10) for index in range(400)]
+        maps = [mapped("r1", 10.0 * index, index % 100, 1e6 + stamp) for index, stamp in enumerate(stamps)]
+        found, _ = run(feed(*maps))
+        said = [item.message for item in found if isinstance(item, Noted) and "put back" in item.message]
+        assert len(said) == MOST_PUT_BACK
+        assert "not said again" in said[-1]
+        assert "not said again" not in said[-2]
 
     def test_the_first_of_each_topic_is_named_and_all_are_counted(self) -> None:
         wild = [

@@ -108,6 +108,28 @@ class McapFile(Closing):
             for _, message in self._read(left, wanted, ChunkReader(self._file, left, cut_chunk=known.cut_chunk)):
                 yield message
 
+    def latest(self, topics: Collection[str], until_ns: int | None = None) -> RawMessage | None:
+        """Return the last message of these topics, up to and with a log time; None if there is none.
+
+        Where the indexes serve, no other message is read, and no chunk but the one it is in.
+        """
+        with translated(self.path, foreign_errors()):
+            entries = self._indexed(topics)
+            if entries is not None:
+                chosen = [each for each in entries if until_ns is None or each.log_time_ns <= until_ns][-1:]
+                try:
+                    found = self._read(chosen, self._wanted(topics), self._claimed(chosen))
+                    return next((message for _, message in found), None)
+                except IndexLiesError:
+                    self._distrust_index()
+        # of messages that are found by a pass through the file, one is held at a time
+        last: RawMessage | None = None
+        for message in self.messages(topics):
+            if until_ns is not None and message.log_time_ns > until_ns:
+                break
+            last = message
+        return last
+
     def _claimed(self, entries: Collection[Entry]) -> ChunkReader:
         chunks = self._summary.chunks if self._summary else ()
         begins_ns = {chunk.chunk_start_offset: chunk.message_start_time for chunk in chunks}
