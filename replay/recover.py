@@ -13,7 +13,7 @@ from replay.file_lock import try_lock
 from replay.interrupts import held_off
 from replay.mcap_salvage import Salvage
 from replay.options import OutputOptions
-from replay.outputs import refuse_inputs, refuse_unwritable
+from replay.outputs import refuse_inputs, refuse_irreplaceable, refuse_unwritable
 from replay.sinks import all_output_paths, claim, refuse_existing, remove_left_over, reserved_paths
 from replay.sinks.mcap_copy import McapCopy
 from replay.sinks.partial_file import PartialFile, partial_name, recovering_name
@@ -86,11 +86,15 @@ def recover(damaged: Path, output: Path, *, force: bool = False) -> Recovery:
         If nothing can be recovered, or the new file cannot be written.
     """
     with translated(damaged):
-        damaged.stat()
+        try:
+            damaged.stat()
+        except FileNotFoundError as error:
+            raise InputError(f"{damaged}: it does not exist; expected an MCAP that was cut off or damaged") from error
     options = OutputOptions(output, force=force)
     is_partial = _recovers_partial(output, damaged)
     own = {partial_name(output)} if is_partial else set[Path]()
     refuse_inputs([path for path in reserved_paths(options) if path not in own], [damaged])
+    refuse_irreplaceable(reserved_paths(options))
     refuse_existing(options)
     refuse_unwritable(output)
     removed: list[str] = []

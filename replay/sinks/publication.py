@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
-from replay.sinks.partial_file import PartialFile, output_errors, sync_folder
+from replay.sinks.partial_file import DESCRIPTORS, PartialFile, output_errors, sync_folder
+
+DEVICES = Path("/dev")
 
 
 class Written(Protocol):
@@ -22,6 +25,30 @@ class Written(Protocol):
 def aside_name(path: Path) -> Path:
     """Return the name of what an earlier run wrote while it is being replaced: in the same folder, as `path` is."""
     return path.with_name(f"{path.name}.replaced")
+
+
+def why_irreplaceable(path: Path) -> str | None:
+    """Return why no output can take a name: what has it is no file, which a rename would destroy; None if it can.
+
+    A link is not followed: the file would not be where whoever made the link looks for it, or the link be lost.
+    """
+    try:
+        status = path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    if stat.S_ISREG(status.st_mode):
+        return None
+    if stat.S_ISDIR(status.st_mode):
+        return "a folder has this name; remove it, or give another name"
+    if stat.S_ISLNK(status.st_mode) and not _is_stream(path):
+        return "this is a link, which no output replaces; give the name of the file itself, or remove the link"
+    return "this is a device, a pipe or the like; outputs are files: give the name of one, and print that afterwards"
+
+
+def _is_stream(path: Path) -> bool:
+    """Tell whether a link leads to what is no file, or may be standard output, though that be a file."""
+    leads_elsewhere = path.exists() and not path.is_file() and not path.is_dir()
+    return leads_elsewhere or path.absolute().parent in {DEVICES, DESCRIPTORS}
 
 
 def publish(written: Sequence[Written], files: Sequence[PartialFile], paths: Sequence[Path]) -> None:
@@ -41,8 +68,8 @@ def publish(written: Sequence[Written], files: Sequence[PartialFile], paths: Seq
     """
     for path in paths:
         with output_errors(path):
-            if path.is_dir():
-                raise IsADirectoryError(errno.EISDIR, "a folder has this name")
+            if why := why_irreplaceable(path):
+                raise FileExistsError(errno.EEXIST, why)
     for file in files:
         with output_errors(file.path):
             file.check()
