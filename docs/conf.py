@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -54,10 +55,16 @@ nitpick_ignore_regex = [
 
 
 def setup(app: Sphinx) -> None:
-    """Say of a default that a function makes ``...``: as dataclasses have it, a signature would be no Python."""
+    """Say of a default that a function makes ``...``: as dataclasses have it, a signature would be no Python.
+
+    Of a number with limits, the type alone is said.
+    """
 
     def made(*told: object) -> tuple[str | None, object]:
         signature, returned = told[-2:]
-        return (signature.replace("<factory>", "...") if isinstance(signature, str) else None), returned
+        if not isinstance(signature, str):
+            return None, returned
+        plain = re.sub(r"~typing\.Annotated\[(\w+), ~[\w.]+\([^)]*\)\]", r"\1", signature)
+        return plain.replace("<factory>", "..."), returned
 
     app.connect("autodoc-process-signature", made)

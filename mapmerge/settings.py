@@ -8,7 +8,7 @@ from functools import cache
 from numbers import Integral
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
-from mapmerge.checks import is_number, shown
+from mapmerge.checks import is_finite, is_number, shown
 from mapmerge.errors import ConfigError
 
 MOST = 1e12
@@ -88,6 +88,8 @@ def _kept(kind: Any, value: Any) -> Any:  # noqa: ANN401 - of any of the fields'
     if base not in (int, float):
         return value if isinstance(value, base) else None
     if not is_number(value) or (base is int and not isinstance(value, Integral)):
+        return None
+    if not is_finite(value):
         return None
     if type(value) not in (int, float):
         value = int(value) if isinstance(value, Integral) else float(value)

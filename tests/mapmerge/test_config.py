@@ -4,6 +4,7 @@ import json
 import math
 import re
 from dataclasses import asdict, dataclass
+from fractions import Fraction
 from typing import Annotated
 
 import numpy as np
@@ -70,6 +71,7 @@ class TestNumbers:
             (VerifyConfig, "near_m", 1e9, "near_m is 1000000000.0; expected a number from 0 to 20"),
             (SearchConfig, "weighed", 10**400, "weighed is 1000"),
             (SearchConfig, "weighed", 10**5000, "weighed is a number of too many digits; expected a whole number from"),
+            (SearchConfig, "clear_wall_m", Fraction(10**400), "clear_wall_m is Fraction(1000"),
             (SearchConfig, "weighed", 8.5, "weighed is 8.5; expected a whole number"),
             (SearchConfig, "free_weights", [], "free_weights is []; expected 1 to 100 numbers, each from 0"),
             (SearchConfig, "free_weights", 1.0, "free_weights is 1.0; expected 1 to 100 numbers"),
