@@ -9,7 +9,8 @@ from pathlib import Path
 from replay.errors import InputError, OutputError, ReplayError, UsageError
 from replay.options import OutputOptions
 from replay.path_errors import path_errors
-from replay.sinks import output_paths, refuse_existing, reserved_paths
+from replay.sinks import all_output_paths, refuse_existing, reserved_paths
+from replay.sinks.publication import why_irreplaceable
 
 _Identity = tuple[int, int]
 
@@ -23,8 +24,10 @@ def refuse_outputs(outputs: OutputOptions, inputs: Sequence[Path]) -> None:
         With the reason.
     """
     refuse_inputs(reserved_paths(outputs), inputs)
+    paths = all_output_paths(outputs)
+    refuse_irreplaceable(paths)
     refuse_existing(outputs)
-    for path in output_paths(outputs).values():
+    for path in paths:
         refuse_unwritable(path)
 
 
@@ -35,7 +38,7 @@ def refuse_inputs(paths: Iterable[Path], inputs: Sequence[Path]) -> None:
     for path in paths:
         resolved = _resolved(path, OutputError)
         if {resolved, *resolved.parents} & folders or _identity(path) in files:
-            raise UsageError(f"{path} is an input, or would be written into one; give another name with --output")
+            raise UsageError(f"{path} is an input, or would be written into one; give another name")
 
 
 def refuse_alike(outputs: Sequence[Sequence[Path]]) -> None:
@@ -56,14 +59,27 @@ def refuse_alike(outputs: Sequence[Sequence[Path]]) -> None:
             taken |= {key: path for key in (_resolved(path, OutputError), _identity(path)) if key is not None}
 
 
+def refuse_irreplaceable(paths: Iterable[Path]) -> None:
+    """Refuse names that links, pipes and devices have: they are neither written to nor replaced, whatever is said."""
+    for path in paths:
+        with path_errors(path, OutputError):
+            why = None if _is_folder(path) else why_irreplaceable(path)
+        if why:
+            raise UsageError(f"{path}: {why}")
+
+
 def refuse_unwritable(path: Path) -> None:
     """Refuse a name that no file can have."""
     with path_errors(path, OutputError):
-        if path.is_dir():
-            raise OutputError(f"{path}: a folder has this name; remove it, or give another --output")
+        if why := why_irreplaceable(path):
+            raise OutputError(f"{path}: {why}")
         folder = path.absolute().parent
         if not folder.is_dir():
             raise OutputError(f"{folder}: there is no such folder; make it, or choose another")
+
+
+def _is_folder(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()
 
 
 def _resolved(path: Path, kind: type[ReplayError]) -> Path:
@@ -82,6 +98,6 @@ def _identities(path: Path) -> set[_Identity]:
 def _identity(path: Path) -> _Identity | None:
     try:
         status = path.stat()
-    except OSError:
+    except (OSError, ValueError):
         return None
     return status.st_dev, status.st_ino

@@ -18,5 +18,7 @@ def path_errors(path: Path, kind: type[ReplayError]) -> Iterator[None]:
         raise kind(f"{path}: the current folder is no longer there; change to another") from error
     except OSError as error:
         raise kind(f"{path}: {error.strerror}; give another path") from error
+    except ValueError as error:  # of characters that no path can hold, such as NUL
+        raise kind(f"{path}: no file can have this name; give another") from error
     except RuntimeError as error:
         raise kind(f"{path}: its links lead in a circle; give another path") from error

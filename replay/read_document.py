@@ -86,13 +86,14 @@ def _text(path: Path, expected: str) -> str:
 
 
 def _lines(node: YamlNode, keys: Keys) -> Iterator[tuple[Keys, int]]:
-    from ruamel.yaml.nodes import MappingNode, SequenceNode
+    from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 
     if keys:
         yield keys, node.start_mark.line + 1
     if isinstance(node, MappingNode):
         for key, value in node.value:
-            yield from _lines(value, (*keys, key.value))
+            if isinstance(key, ScalarNode):
+                yield from _lines(value, (*keys, key.value))
     elif isinstance(node, SequenceNode):
         for at, value in enumerate(node.value):
             yield from _lines(value, (*keys, at))

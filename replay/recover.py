@@ -13,7 +13,7 @@ from replay.file_lock import try_lock
 from replay.interrupts import held_off
 from replay.mcap_salvage import Salvage
 from replay.options import OutputOptions
-from replay.outputs import refuse_inputs, refuse_unwritable
+from replay.outputs import refuse_inputs, refuse_irreplaceable, refuse_unwritable
 from replay.sinks import all_output_paths, claim, refuse_existing, remove_left_over, reserved_paths
 from replay.sinks.mcap_copy import McapCopy
 from replay.sinks.partial_file import PartialFile, partial_name, recovering_name
@@ -91,6 +91,7 @@ def recover(damaged: Path, output: Path, *, force: bool = False) -> Recovery:
     is_partial = _recovers_partial(output, damaged)
     own = {partial_name(output)} if is_partial else set[Path]()
     refuse_inputs([path for path in reserved_paths(options) if path not in own], [damaged])
+    refuse_irreplaceable(all_output_paths(options))
     refuse_existing(options)
     refuse_unwritable(output)
     removed: list[str] = []

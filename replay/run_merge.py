@@ -42,7 +42,9 @@ class Run:
         *,
         is_shown: bool = False,
     ) -> None:
-        if is_shown and (written is None or not written.rrd):
+        if is_shown and written is None:
+            raise UsageError("--view shows the Rerun recording, which is not written; give --output OUT.mcap as well")
+        if is_shown and written is not None and not written.rrd:
             raise UsageError("--view shows the Rerun recording, which is not written; leave out --no-rrd, or --view")
         self._options = options
         self._written = written

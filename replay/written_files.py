@@ -8,7 +8,7 @@ from pathlib import Path
 
 from replay.errors import UsageError
 from replay.interrupts import held_off
-from replay.outputs import refuse_alike, refuse_inputs, refuse_unwritable
+from replay.outputs import refuse_alike, refuse_inputs, refuse_irreplaceable, refuse_unwritable
 from replay.sinks.partial_file import PartialFile, output_errors, partial_name
 from replay.sinks.publication import aside_name, publish
 
@@ -29,6 +29,7 @@ def refuse_files(paths: Sequence[Path], inputs: Sequence[Path], *, force: bool) 
     reserved = [reserved_names(path) for path in paths]
     refuse_inputs([name for names in reserved for name in names], inputs)
     refuse_alike(reserved)
+    refuse_irreplaceable(paths)
     existing = [str(path) for path in paths if os.path.lexists(path)]
     if existing and not force:
         raise UsageError(f"there is already {', '.join(existing)}; give --force to replace, or another name")

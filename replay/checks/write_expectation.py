@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from mapmerge.sim2 import Sim2
 from replay.checks.expectation import WITHIN_DEG, WITHIN_M
 from replay.figures import exact
+from replay.plain_text import plain
 from replay.run_result import RobotResult, RunResult
 
 _SHARE_LESS = 0.02
@@ -23,7 +24,8 @@ def expectation_text(result: RunResult) -> str:
 
 
 def _lines(result: RunResult) -> Iterator[str]:
-    yield f"# What `replay check` expects; written from a run of replay {result.version}. Change it as you need."
+    version = plain(result.version)
+    yield f"# What `replay check` expects; written from a run of replay {version}. Change it as you need."
     yield f"reference: {_name(result.reference)}"
     yield "other_robots: forbidden"
     yield f"max_skipped: {sum(result.skipped.values())}"

@@ -26,14 +26,14 @@ exit status: 0 printed; 2 bad usage, or a setting that there is not; 3 standard 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add all that are settings of some command."""
-    from replay.commands.check import add_expected
+    from replay.flags import expected
 
     inputs.add(parser, "--from")
     parser.add_argument("--changed", action="store_true", help="print only those that are not the default")
     placing.add(parser)
     outputs.add(parser)
     rules.add_all(parser)
-    add_expected(parser)
+    expected.add(parser)
 
 
 def run(options: argparse.Namespace) -> int:

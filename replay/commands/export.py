@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from replay.errors import UsageError
 from replay.exit_status import EXIT_DONE
 from replay.export import MODES, TARGETS, TRANSFORMS
-from replay.flags.values import read_flag
+from replay.flags.values import read_flag, refuse_no_name
 from replay.plain_text import listed, plain
 from replay.standard_streams import printing, say
 
@@ -107,28 +107,10 @@ def run(options: argparse.Namespace) -> int:
         raise UsageError("--maps is where robots' maps are taken from; say whose, as --robots r2")
     if options.topic is not None and (options.robots or options.to == TRANSFORMS):
         raise UsageError("--topic names one map as it is recorded; leave it out with --robots and with --to tf")
-    _refuse_no_name(options)
+    if options.output is not None:
+        endings = () if options.to == TRANSFORMS else TARGETS[options.to].suffixes
+        refuse_no_name("--output", options.output, endings, "floor")
     return _transforms(options, at) if options.to == TRANSFORMS else _maps(options, at)
-
-
-def _refuse_no_name(options: argparse.Namespace) -> None:
-    """Refuse what no file can be called, or has nothing before its ending."""
-    from replay.errors import OutputError
-    from replay.path_errors import path_errors
-
-    path: Path | None = options.output
-    if path is None:
-        return
-    endings = () if options.to == TRANSFORMS else TARGETS[options.to].suffixes
-    with path_errors(path, OutputError):
-        is_folder = path.is_dir()
-    if is_folder or path.name in ("", "..", *endings):
-        why = "this is a folder" if is_folder else "nothing stands before the ending"
-        raise UsageError(f"--output {plain(str(path))}: {why}; expected a name of files, such as {_example(path)}")
-
-
-def _example(path: Path) -> str:
-    return plain(str((path if path.is_dir() else path.parent) / "floor"))
 
 
 def _transforms(options: argparse.Namespace, at: TimeBound | None) -> int:

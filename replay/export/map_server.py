@@ -88,9 +88,7 @@ def _description(grid: Grid, image: str, mode: str) -> bytes:
             f"free_thresh: {free}\n"
         ).encode()
     except UnicodeEncodeError as error:
-        raise OutputError(
-            f"{image}: a name that is not UTF-8 cannot stand in a .yaml; give another --output"
-        ) from error
+        raise OutputError(f"{image}: a name that is not UTF-8 cannot stand in a .yaml; give another name") from error
 
 
 def _number(value: float) -> str:

@@ -69,7 +69,7 @@ def refuse_existing(options: OutputOptions) -> None:
     # a link that leads nowhere is there, too
     existing = [str(path) for path in all_output_paths(options) if os.path.lexists(path)]
     if existing and not options.force:
-        names = "another --output" if options.html is None else "another --output and --report"
+        names = "another name" if options.html is None else "other names"
         raise UsageError(f"there is already {', '.join(existing)}; give --force to replace, or {names}")
 
 

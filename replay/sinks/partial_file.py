@@ -20,7 +20,7 @@ DESCRIPTORS = Path("/dev/fd")
 """Where open files have paths, if the system has that."""
 _ATTEMPTS = 100
 _FLAGS = os.O_RDWR | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
-_ELSEWHERE = "give another --output"
+_ELSEWHERE = "give another name"
 _NO_SPACE = f"free space there, or {_ELSEWHERE}"
 _NO_RIGHT = f"make the folder one that you may write to, or {_ELSEWHERE}"
 _REMEDIES = {
@@ -147,13 +147,11 @@ class PartialFile:
             return
         except OSError as error:
             if error.errno == errno.ELOOP:
-                raise OSError(
-                    error.errno, f"{self.partial.name} is a link; remove it, or give another --output"
-                ) from error
+                raise OSError(error.errno, f"{self.partial.name} is a link; remove it, or give another name") from error
             raise
         with os.fdopen(descriptor, "rb") as file:
             if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-                raise OSError(errno.EEXIST, f"{self.partial.name} is no file; remove it, or give another --output")
+                raise OSError(errno.EEXIST, f"{self.partial.name} is no file; remove it, or give another name")
             if not try_lock(descriptor):
                 raise self._in_use()
             if not self._has_name(descriptor):
@@ -192,7 +190,7 @@ class PartialFile:
 
     def _in_use(self) -> OutputError:
         return OutputError(
-            f"{self.path}: another run is writing it now; wait until that has ended, or give another --output"
+            f"{self.path}: another run is writing it now; wait until that has ended, or give another name"
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -24,6 +25,24 @@ def aside_name(path: Path) -> Path:
     return path.with_name(f"{path.name}.replaced")
 
 
+def why_irreplaceable(path: Path) -> str | None:
+    """Return why no output can take a name: what has it is no file, which a rename would destroy; None if it can.
+
+    A link is not followed: the file would not be where whoever made the link looks for it, or the link be lost.
+    """
+    try:
+        status = path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    if stat.S_ISREG(status.st_mode):
+        return None
+    if stat.S_ISDIR(status.st_mode):
+        return "a folder has this name; remove it, or give another name"
+    if stat.S_ISLNK(status.st_mode):
+        return "this is a link, which no output replaces; give the name of a file, or remove the link"
+    return "this is a device, a pipe or the like, which no output replaces; give the name of a file"
+
+
 def publish(written: Sequence[Written], files: Sequence[PartialFile], paths: Sequence[Path]) -> None:
     """Give what was written its final name, in place of what an earlier run wrote, which stays if that fails.
 
@@ -41,8 +60,8 @@ def publish(written: Sequence[Written], files: Sequence[PartialFile], paths: Seq
     """
     for path in paths:
         with output_errors(path):
-            if path.is_dir():
-                raise IsADirectoryError(errno.EISDIR, "a folder has this name")
+            if why := why_irreplaceable(path):
+                raise FileExistsError(errno.EEXIST, why)
     for file in files:
         with output_errors(file.path):
             file.check()

@@ -13,6 +13,7 @@ from junitparser import JUnitXml
 from mapmerge.sim2 import Sim2
 from replay.arguments import command_parser
 from replay.checks.expectation import load_expectation
+from replay.errors import OutputError
 from tests.bags import write_mcap
 from tests.floors import in_frame
 from tests.program import Program, Ran, in_process_of_its_own
@@ -138,14 +139,15 @@ def test_a_run_that_was_made_before_is_not_made_again(replay: Program, outcome: 
     for run in (outcome, outcome.with_suffix(".json")):
         ran = checked(replay, run, "robots: {r2: merged}")
         assert (ran.status, ran.err) == (0, "")
-    (replay.folder / "settings.toml").write_text("", encoding="utf-8")
+    (replay.folder / "settings.toml").write_text("time.clock = 'log'\n", encoding="utf-8")
     given = [flag for flag in _flags_of_a_merge() if flag.split()[0] not in ("--json", "--config")]
     assert {"--min-confidence", "--method", "--max-memory", "--clock", "--output"} <= {
         flag.split()[0] for flag in given
     }
     for flag in (*given, "--config settings.toml"):
         ran = checked(replay, outcome, "robots: {r2: merged}", *flag.split())
-        assert ran.error.startswith(f"{flag.split()[0]}: "), flag
+        said = "settings.toml: time.clock: " if flag.startswith("--config") else f"{flag.split()[0]}: "
+        assert ran.error.startswith(said), flag
         assert "nothing is merged" in ran.error
 
 
@@ -458,6 +460,112 @@ def test_a_job_that_cannot_begin_tells_why(replay: Program, tmp_path: Path, two:
     assert replay("check", tmp_path / "none.bag", "--expect", tmp_path / "none.yaml", *written).status == 2
     assert "does not exist" in junit.read_text(encoding="utf-8")
     assert told.read_text(encoding="utf-8").count("nothing was checked: ") == 2
+
+
+@pytest.mark.parametrize("flags", [("--config", "settings.toml"), ("--set", "check.expect=expect.yaml")])
+def test_settings_of_what_is_expected_serve_a_run_that_was_made_before(
+    replay: Program, outcome: Path, flags: tuple[str, ...]
+) -> None:
+    (replay.folder / "expect.yaml").write_text("robots: {r2: merged}", encoding="utf-8")
+    (replay.folder / "settings.toml").write_text(
+        '[check]\nexpect = "expect.yaml"\njunit = "out.xml"\n', encoding="utf-8"
+    )
+    ran = replay("check", outcome, *flags)
+    assert (ran.status, ran.err) == (0, "")
+    assert (replay.folder / "out.xml").exists() == (flags[0] == "--config")
+
+
+GREEN = '<testsuites name="replay check"><testsuite name="earlier" tests="1" failures="0" errors="0" /></testsuites>'
+
+
+@pytest.mark.parametrize("error", [RuntimeError("odd"), MemoryError(), KeyboardInterrupt(), OutputError("full")])
+@pytest.mark.parametrize("can_be_told", [True, False])
+def test_no_earlier_findings_stand_for_a_run_that_ends_otherwise(
+    replay: Program, two: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, can_be_told: bool
+) -> None:
+    junit, summary = replay.folder / "out.xml", replay.folder / "out.md"
+    junit.write_text(GREEN, encoding="utf-8")
+
+    def failing(*_: object) -> None:
+        (suite,) = JUnitXml.fromfile(str(junit))
+        assert suite.errors == 1  # though the process be killed now
+        if not can_be_told:
+            (replay.folder / "out.xml.partial").mkdir()
+        raise error
+
+    monkeypatch.setattr("replay.execute.merge_into", failing)
+    ran = checked(replay, two, "robots: {r2: merged}", "--junit", junit, "--summary", summary)
+    expected = {RuntimeError: 3, MemoryError: 2, KeyboardInterrupt: 130, OutputError: 3}
+    assert ran.status == expected[type(error)]
+    (suite,) = JUnitXml.fromfile(str(junit))
+    (case,) = suite
+    assert suite.errors == 1
+    why = case.result[0].message
+    words = {RuntimeError: "bug in replay: RuntimeError: odd", MemoryError: "memory", KeyboardInterrupt: "interrupted"}
+    assert (words.get(type(error), "full") if can_be_told else "cut off") in why
+    assert "nothing was checked: " in summary.read_text(encoding="utf-8")
+    if not can_be_told:
+        assert "out.xml: cannot be written" in ran.err
+
+
+def test_findings_are_told_though_they_cannot_be_written(
+    replay: Program, outcome: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OutputError("out.xml: cannot be written: No space left on device")
+
+    monkeypatch.setattr("replay.checks.told.junit_xml", full)
+    ran = checked(replay, outcome, "robots: {r2: unmerged}", "--junit", "out.xml", "--summary", "out.md")
+    assert ran.status == 3
+    assert "✗ r2: its status is unmerged; it is merged" in ran.out
+    assert ran.error.endswith("No space left on device")
+    assert "1 of 1 expectation does not hold" in (replay.folder / "out.md").read_text(encoding="utf-8")
+
+
+def test_findings_do_not_wait_for_flags_of_a_merge_that_are_wrong(replay: Program, two: Path) -> None:
+    (replay.folder / "out.xml").write_text(GREEN, encoding="utf-8")
+    flags = ("-o", "out.mcap", "--every", "often", "--junit", "out.xml")
+    assert checked(replay, two, "robots: {r2: merged}", *flags).status == 2
+    assert "--every: " in (replay.folder / "out.xml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("flag", ["--junit", "--summary", "--write-expect"])
+@pytest.mark.parametrize("name", ["", ".", "..", "/", "a\0b"])
+def test_what_is_no_name_of_a_file_is_refused(replay: Program, outcome: Path, flag: str, name: str) -> None:
+    rest = () if flag == "--write-expect" else ("--expect", "expect.yaml")
+    (replay.folder / "expect.yaml").write_text("robots: {r2: merged}", encoding="utf-8")
+    ran = (
+        replay("check", outcome, flag, name, *rest, "--force")
+        if not rest
+        else replay("check", outcome, flag, name, *rest)
+    )
+    assert ran.status in (2, 3)
+    assert "no file can have this name" in ran.error if "\0" in name else ran.error.startswith(f"{flag}")
+    assert [path.name for path in replay.folder.iterdir()] == ["expect.yaml"]
+
+
+@pytest.mark.parametrize("key", ["? [1, 2]\n: 3", "? {a: b}\n: 3", "[1]: 2", "? ~\n: 3"])
+def test_keys_that_are_no_names_are_refused(replay: Program, outcome: Path, key: str) -> None:
+    ran = checked(replay, outcome, f"robots: {{r2: merged}}\n{key}\n")
+    assert ran.status == 2
+    assert ran.error.startswith(f"{replay.folder / 'expect.yaml'}: ")
+
+
+@pytest.mark.parametrize("version", ["1\nmax_skipped: 99\n#", "1\udc80", "1\u2028robots:"])
+def test_nothing_in_a_report_becomes_an_expectation(replay: Program, outcome: Path, version: str) -> None:
+    report = json.loads(outcome.with_suffix(".json").read_text(encoding="utf-8"))
+    report["version"] = version
+    (replay.folder / "odd.json").write_text(json.dumps(report), encoding="utf-8")
+    ran = replay("check", "odd.json", "--write-expect", "expect.yaml")
+    assert ran.status == 0, ran.err
+    assert load_expectation(replay.folder / "expect.yaml").max_skipped == {"": 0}
+    assert replay("check", "odd.json", "--expect", "expect.yaml").status == 0
+
+
+def test_a_run_is_shown_only_where_it_is_written(replay: Program, two: Path) -> None:
+    ran = checked(replay, two, "robots: {r2: merged}", "--view")
+    assert ran.error.endswith("give --output OUT.mcap as well")
+    assert "--no-rrd" not in ran.error
 
 
 def test_a_page_without_the_other_outputs_is_refused(replay: Program, tmp_path: Path, two: Path) -> None:

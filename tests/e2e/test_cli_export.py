@@ -444,7 +444,7 @@ def test_a_name_that_no_file_can_have_is_refused(replay: Program, outcome: Path,
     (replay.folder / "there").mkdir()
     ran = replay("export", outcome, "--to", target, "-o", name)
     assert ran.status == 2
-    assert "expected a name of files, such as " in ran.error
+    assert "expected a name, such as " in ran.error
     assert [path.name for path in replay.folder.rglob("*")] == ["there"]
 
 

@@ -319,7 +319,7 @@ class TestWhereNothingCanBeWritten:
             (errno.ENOSPC, "free space"),
             (errno.EDQUOT, "free space"),
             (errno.EFBIG, "`ulimit -f`"),
-            (errno.EIO, "give another --output"),
+            (errno.EIO, "give another name"),
         ],
     )
     def test_it_is_said_what_to_do(
@@ -335,7 +335,7 @@ class TestWhereNothingCanBeWritten:
         assert ran.status == 3
         assert ran.error.startswith(f"{tmp_path / 'out.mcap'}: cannot be written: {os.strerror(number)}; ")
         assert remedy in ran.error
-        assert "--output" in ran.error
+        assert "another name" in ran.error
 
     def test_no_folder(self, replay: Program, two: Path, tmp_path: Path) -> None:
         ran = replay("merge", two, "-o", "nowhere/out.mcap", "--no-rrd")
@@ -350,7 +350,7 @@ class TestWhereNothingCanBeWritten:
         ran = replay("merge", two, "-o", folder / "out.mcap", "--no-rrd")
         assert ran.status == 3
         assert f"{folder}/out.mcap: cannot be written" in ran.error
-        assert ran.error.endswith("; give another --output")
+        assert ran.error.endswith("; give another name")
 
     def test_a_folder_that_becomes_read_only(
         self, replay: Program, two: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -369,7 +369,7 @@ class TestWhereNothingCanBeWritten:
             ran = replay("merge", two, "-o", out / "out.mcap", "--force", "--images", "none")
             assert ran.status == 3
             assert "cannot be written: " in ran.err.splitlines()[-1]
-            assert ran.err.endswith("; make the folder one that you may write to, or give another --output\n")
+            assert ran.err.endswith("; make the folder one that you may write to, or give another name\n")
             assert not {"out.mcap", "out.rrd"} & set(names(out))
             assert (out / "out.json").read_text() == "of an earlier run"
 
@@ -426,7 +426,7 @@ class TestWhereNothingCanBeWritten:
                 if ran.status:
                     assert ran.err.splitlines()[-1].startswith(f"replay: error: {disk}/out.")
                     assert ran.err.endswith(
-                        "written: No space left on device; free space there, or give another --output\n"
+                        "written: No space left on device; free space there, or give another name\n"
                     )
                     assert not names(disk)
         assert statuses == [3, 3, 3, 0]

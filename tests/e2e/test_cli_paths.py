@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import subprocess
 from pathlib import Path
 
@@ -73,7 +74,7 @@ def test_a_link_that_leads_nowhere_is_not_replaced(replay: Program, two: Path, t
         (tmp_path / name).symlink_to("nowhere")
         ran = replay(command, two, *COMMANDS[command], "-o", "out.mcap")
         assert ran.status == 2
-        assert f"there is already {name}" in ran.error
+        assert ran.error.startswith(f"{name}: this is a link, which no output replaces")
         assert [each.name for each in tmp_path.iterdir()] == [name]
         assert (tmp_path / name).is_symlink()
         (tmp_path / name).unlink()
@@ -133,3 +134,73 @@ def test_names_that_are_not_utf_8(replay: Program, tmp_path: Path, command: str)
     written = {os.fsencode(each.name) for each in tmp_path.iterdir()} - {b"\xff.mcap"}
     suffixes = (b".mcap", b".rrd", b".json") if command == "merge" else (b".mcap",)
     assert written == {b"out\xfe" + suffix for suffix in suffixes}
+
+
+@pytest.fixture(params=["pipe", "link", "link to a pipe", "device"])
+def taken(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """A name that no file has; nothing may replace it, nor wait for it."""
+    path = tmp_path / "taken"
+    if request.param == "pipe":
+        os.mkfifo(path)
+    elif request.param == "device":
+        try:
+            os.mknod(path, stat.S_IFCHR | 0o600, os.makedev(1, 3))
+        except PermissionError:
+            pytest.skip("only root makes devices")
+    else:
+        other = tmp_path / "other"
+        os.mkfifo(other) if "pipe" in request.param else other.write_text("mine")
+        path.symlink_to(other)
+    return path.name
+
+
+@needs_posix
+@pytest.mark.parametrize(
+    ("ending", "command"),
+    [
+        (".mcap", "merge {run} -o taken.mcap --force --no-rrd --images none"),
+        (".rrd", "merge {run} -o taken.mcap --force --no-rrd --images none"),
+        (".json", "merge {run} -o taken.mcap --force --no-rrd --images none"),
+        (".html", "merge {run} -o o.mcap --report taken.html --force --no-rrd --images none"),
+        (".mcap", "recover {run} -o taken.mcap --force"),
+        ("", "export {out} --to tf -o taken --force"),
+        (".pgm", "export {out} -o taken --force"),
+        (".xml", "check {out} --expect e.yaml --junit taken.xml"),
+        (".yaml", "check {out} --write-expect taken.yaml --force"),
+        (".md", "check {out} --expect e.yaml --summary taken.md"),
+    ],
+)
+def test_what_is_no_file_is_neither_replaced_nor_opened(
+    two: Path, outcome: Path, tmp_path: Path, taken: str, ending: str, command: str
+) -> None:
+    path = (tmp_path / taken).rename(tmp_path / f"taken{ending}")
+    (tmp_path / "e.yaml").write_text("robots: {r2: merged}")
+    before = path.lstat()
+    arguments = command.format(run=two, out=outcome).split()
+    done = subprocess.run([*PROGRAM, *arguments], cwd=tmp_path, env=quiet(), text=True, capture_output=True, timeout=60)
+    after = path.lstat()
+    assert (after.st_ino, after.st_mode, after.st_size) == (before.st_ino, before.st_mode, before.st_size)
+    if ending == ".md" and path.is_file():  # appended to, where it leads to
+        assert "expectation holds" in (tmp_path / "other").read_text()
+        return
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith(f"replay: error: {path.name}: this is ")
+    assert sorted(each.name for each in tmp_path.iterdir() if each.name != "other") == sorted(["e.yaml", path.name])
+
+
+@needs_posix
+@pytest.mark.parametrize("name", ["/dev/null", "/dev/stdout"])
+@pytest.mark.parametrize("flag", ["--junit", "--summary"])
+def test_findings_are_not_written_to_devices(replay: Program, outcome: Path, name: str, flag: str) -> None:
+    (replay.folder / "e.yaml").write_text("robots: {r2: merged}")
+    before = Path(name).lstat()
+    ran = replay("check", outcome, "--expect", "e.yaml", flag, name)
+    assert Path(name).lstat().st_ino == before.st_ino
+    if ran.status:  # where standard output is a file, it is appended to as any
+        assert ran.error.startswith(f"{name}: this is ")
+
+
+def test_outputs_of_settings_with_names_that_no_file_can_have(replay: Program, two: Path) -> None:
+    (replay.folder / "s.toml").write_text('[outputs]\noutput = "a\\u0000b.mcap"\n')
+    ran = replay("merge", two, "--config", "s.toml")
+    assert (ran.status, ran.error) == (3, "a\\x00b.mcap: no file can have this name; give another")
