@@ -86,7 +86,10 @@ def recover(damaged: Path, output: Path, *, force: bool = False) -> Recovery:
         If nothing can be recovered, or the new file cannot be written.
     """
     with translated(damaged):
-        damaged.stat()
+        try:
+            damaged.stat()
+        except FileNotFoundError as error:
+            raise InputError(f"{damaged}: it does not exist; expected an MCAP that was cut off or damaged") from error
     options = OutputOptions(output, force=force)
     is_partial = _recovers_partial(output, damaged)
     own = {partial_name(output)} if is_partial else set[Path]()
