@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 from replay.errors import UsageError
 from replay.exit_status import EXIT_DONE
 from replay.export import MODES, TARGETS, TRANSFORMS
+from replay.flags.inputs import robot_names
 from replay.flags.values import read_flag, refuse_no_name
-from replay.plain_text import listed, plain
+from replay.plain_text import escaped, plain
 from replay.standard_streams import printing, say
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ exit status: 0 written; 2 bad usage, or an input that cannot be read; 3 an outpu
 """
 
 _NO_TURN_DEG = 1e-6
+_ROS = ("1", "2")
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -89,13 +91,10 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     outputs.add_argument(
         "--mode",
         choices=MODES,
-        default=MODES[0],
         help="of map_server: occupied, free and unknown alone; percentages as shades of a PNG; or as they are "
-        "(default: %(default)s)",
+        f"(default: {MODES[0]})",
     )
-    outputs.add_argument(
-        "--ros", choices=("1", "2"), default="2", help="of tf: for which ROS the lines are (default: %(default)s)"
-    )
+    outputs.add_argument("--ros", choices=_ROS, help=f"of tf: for which ROS the lines are (default: {_ROS[-1]})")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -103,14 +102,25 @@ def run(options: argparse.Namespace) -> int:
     from replay.options import TimeBound
 
     at = read_flag("--at", options.at, TimeBound.parse) if options.at is not None else None
-    if options.maps and not options.robots:
-        raise UsageError("--maps is where robots' maps are taken from; say whose, as --robots r2")
-    if options.topic is not None and (options.robots or options.to == TRANSFORMS):
-        raise UsageError("--topic names one map as it is recorded; leave it out with --robots and with --to tf")
+    _refuse_useless(options)
     if options.output is not None:
         endings = () if options.to == TRANSFORMS else TARGETS[options.to].suffixes
         refuse_no_name("--output", options.output, endings, "floor")
     return _transforms(options, at) if options.to == TRANSFORMS else _maps(options, at)
+
+
+def _refuse_useless(options: argparse.Namespace) -> None:
+    """Refuse flags that the others leave nothing to say."""
+    robot_names(options.robots)
+    is_tf = options.to == TRANSFORMS
+    if options.maps and (options.robots is None or is_tf):
+        raise UsageError("--maps is where robots' maps are taken from; say whose, as --robots r2, and not with --to tf")
+    if options.topic is not None and (options.robots is not None or is_tf):
+        raise UsageError("--topic names one map as it is recorded; leave it out with --robots and with --to tf")
+    if options.mode is not None and options.to != "map_server":
+        raise UsageError(f"--mode is how map_server maps hold cells; leave it out with --to {options.to}")
+    if options.ros is not None and not is_tf:
+        raise UsageError("--ros is for which ROS transforms are; leave it out, or give --to tf")
 
 
 def _transforms(options: argparse.Namespace, at: TimeBound | None) -> int:
@@ -120,12 +130,11 @@ def _transforms(options: argparse.Namespace, at: TimeBound | None) -> int:
     if options.output is not None:
         refuse_files([options.output], [options.file], force=options.force)
     result = _run_result(options.file, _within(options, at))
-    robots = _robots(options.robots, result) if options.robots else tuple(result.robots)
-    found = list(lines(result, robots, int(options.ros)))
+    found = list(lines(result, _robots(options, result) or tuple(result.robots), int(options.ros or _ROS[-1])))
     if options.output is not None:
         content = "".join(f"{line}\n" for line in found)
         write_files({options.output: content.encode()}, force=options.force)
-        say(f"replay: wrote {options.output}")
+        say(f"replay: wrote {escaped(str(options.output))}")
         return EXIT_DONE
     with printing():
         for line in found:
@@ -142,7 +151,7 @@ def _maps(options: argparse.Namespace, at: TimeBound | None) -> int:
     contents: dict[Path, bytes] = {}
     stems = _stems(options, list(found.grids))
     for name, grid in found.grids.items():
-        contents |= write(grid, stems[name], options.mode)
+        contents |= write(grid, stems[name], options.mode or MODES[0])
     refuse_files(list(contents), [options.file, *found.files], force=options.force)
     write_files(contents, force=options.force)
     _tell(found, [str(path) for path in contents], options)
@@ -151,20 +160,24 @@ def _maps(options: argparse.Namespace, at: TimeBound | None) -> int:
 
 def _chosen(options: argparse.Namespace, at: TimeBound | None) -> Maps:
     from replay.export.maps import one_map
+    from replay.export.merged import merged_map
     from replay.export.placed import placed_maps
     from replay.report_file import holds_report
     from replay.runs import RunPath
 
     is_run = holds_report(options.file)
     at = _within(options, at) if is_run else at
-    if options.robots:
+    if options.robots is not None:
         result = _run_result(options.file, at)
         recordings = [RunPath.parse(text) for text in options.maps]
-        return placed_maps(result, _robots(options.robots, result), recordings, at, _say)
+        return placed_maps(result, _robots(options, result), recordings, at, _say)
     if options.file.suffix == ".json" and is_run:
         raise UsageError(f"{options.file}: a report holds no map; give OUT.mcap, or --robots and --maps")
     if is_run and options.topic is None:
-        _say_who_is_missing(_run_result(options.file, at))
+        found, missing = merged_map(options.file, at, _say)
+        if missing:
+            say(f"replay: {missing}")
+        return found
     return one_map(options.file, options.topic, at, _say)
 
 
@@ -183,13 +196,6 @@ def _within(options: argparse.Namespace, at: TimeBound | None) -> TimeBound | No
     return absolute
 
 
-def _say_who_is_missing(result: RunResult) -> None:
-    """Name the robots whose maps are not in the merged map: by itself it does not show that."""
-    left = [robot for robot, found in result.robots.items() if found.merged_from_map is None]
-    if left:
-        say(f"replay: not in the merged map: {listed([plain(robot) for robot in left])}; the report says why")
-
-
 def _run_result(path: Path, at: TimeBound | None) -> RunResult:
     from replay.report_file import read_report
     from replay.run_result import RunResult
@@ -197,18 +203,22 @@ def _run_result(path: Path, at: TimeBound | None) -> RunResult:
     return RunResult.of(read_report(path, at), path)
 
 
-def _robots(text: str, result: RunResult) -> tuple[str, ...]:
-    names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
+def _robots(options: argparse.Namespace, result: RunResult) -> tuple[str, ...]:
+    """Return the robots that were named."""
+    names = robot_names(options.robots) or ()
     unknown = [name for name in names if name not in result.robots]
     if unknown:
-        raise UsageError(f"--robots {text}: there is no robot {unknown[0]!r}; there are {', '.join(result.robots)}")
+        raise UsageError(
+            f"--robots {options.robots}: there is no robot {unknown[0]!r}; there are {', '.join(result.robots)}"
+        )
     return names
 
 
 def _stems(options: argparse.Namespace, robots: Sequence[str]) -> dict[str, Path]:
     """Return the paths of the files of each map, without their endings, no two alike."""
-    path: Path = options.output or Path(options.file.resolve().name)
-    known = TARGETS[options.to].suffixes if options.output is not None else (options.file.suffix,)
+    file: Path = options.file
+    path = options.output or Path(file.name if file.is_file() else file.resolve().name)
+    known = TARGETS[options.to].suffixes if options.output is not None else (path.suffix,)
     name = path.name.removesuffix(path.suffix) if path.suffix and path.suffix in known else path.name
     if len(robots) == 1:
         return {robots[0]: path.with_name(name)}
@@ -233,7 +243,7 @@ def _tell(found: Maps, paths: Sequence[str], options: argparse.Namespace) -> Non
     when = f", as of {moment(found.stamp_ns)}" if found.stamp_ns else ""
     for name, grid in found.grids.items():
         turn_deg = math.degrees(grid.map_from_grid.yaw_rad)
-        whose = f"{plain(name)}: " if options.robots else ""
+        whose = f"{plain(name)}: " if options.robots is not None else ""
         say(f"replay: {whose}{grid.cols} × {grid.rows} cells of {grid.resolution_m:g} m{when}")
         if not grid.known.any():
             say("replay: nothing is known in it: it is the map of a time when there was none")

@@ -20,6 +20,7 @@ from replay.sources import open_source
 from replay.sources.base import GRID_TYPE
 from replay.timeline import Tick, ticks
 from replay.topics import MAP_TOPIC
+from replay.words import moment
 
 Say = Callable[[Skipped | Noted], None]
 """Is told what of a recording is not used, and what else is to be known of it."""
@@ -55,6 +56,22 @@ class Maps:
     grids: Mapping[str, Grid]
     stamp_ns: int
     files: tuple[Path, ...]
+
+
+class NoMapYetError(InputError):
+    """The time is before that of any map.
+
+    Parameters
+    ----------
+    paths
+        Where maps were looked for.
+    first_ns
+        When the first one was recorded.
+    """
+
+    def __init__(self, paths: str, first_ns: int) -> None:
+        super().__init__(f"{paths}: the first map is of {moment(first_ns)} ({first_ns}ns)")
+        self.first_ns = first_ns
 
 
 def one_map(path: Path, topic: str | None, at: TimeBound | None, say: Say) -> Maps:
@@ -106,7 +123,9 @@ def maps_at(options: RunOptions, at: TimeBound | None, say: Say, check: Check | 
         files = tuple(plan.files())
     if stamp_ns is None:
         paths = ", ".join(str(run.path) for run in options.runs)
-        raise InputError(f"{paths}: there is no map {'' if at is None else 'by that time '}that can be used")
+        if first_ns is not None:
+            raise NoMapYetError(paths, first_ns)
+        raise InputError(f"{paths}: there is no map that can be used")
     return Maps(grids, stamp_ns, files)
 
 

@@ -99,7 +99,7 @@ def run_options(options: argparse.Namespace, *, needs_runs: bool = True) -> RunO
     placed = placing.placing_options(options) if hasattr(options, "method") else {}
     return RunOptions(
         runs=tuple(RunPath.parse(text) for text in options.runs),
-        robots=_robots(options.robots),
+        robots=robot_names(options.robots),
         topics=tuple(TopicChoice.parse(text) for text in options.topic),
         clock=options.clock,
         start=read_flag("--start", options.start, TimeBound.parse) if options.start is not None else None,
@@ -130,7 +130,8 @@ def refuse_no_runs(options: argparse.Namespace) -> None:
         raise UsageError(f"RUN is missing; expected one recording or more, PATH or ROBOT=PATH, such as `{example}`")
 
 
-def _robots(text: str | None) -> tuple[str, ...] | None:
+def robot_names(text: str | None) -> tuple[str, ...] | None:
+    """Return the names that ``--robots`` says; None for all."""
     if text is None:
         return None
     names = tuple(name.strip() for name in text.split(","))

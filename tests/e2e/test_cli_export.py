@@ -454,3 +454,72 @@ def test_who_is_not_in_the_merged_map_is_said(replay: Program, tmp_path: Path) -
     ran = replay("export", tmp_path / "out.mcap", "-o", tmp_path / "floor")
     assert ran.status == 0
     assert "not in the merged map: r2;" in ran.err
+
+
+@pytest.mark.parametrize("ros", ["1", "2"])
+@pytest.mark.parametrize("frame", ["f" * 300, f"a {'b' * 250}", "it's; $(x)", "é"])
+def test_a_frame_is_as_it_is_in_its_command(replay: Program, outcome: Path, frame: str, ros: str) -> None:
+    report = json.loads(outcome.with_suffix(".json").read_text(encoding="utf-8"))
+    report["robots"]["r2"]["map_frame"] = frame
+    (replay.folder / "odd.json").write_text(json.dumps(report), encoding="utf-8")
+    ran = replay("export", "odd.json", "--to", "tf", "--robots", "r2", "--ros", ros)
+    assert shlex.split(ran.out.splitlines()[-1])[-1] == frame
+
+
+@pytest.mark.parametrize(
+    ("frame", "ros"), [("-h", "2"), ("-h", "1"), ("a\nb", "2"), ("\u202emap", "2"), ("", "2"), ("__name:=x", "1")]
+)
+def test_a_frame_that_no_command_can_name_is_a_comment(replay: Program, outcome: Path, frame: str, ros: str) -> None:
+    report = json.loads(outcome.with_suffix(".json").read_text(encoding="utf-8"))
+    report["robots"]["r2"]["map_frame"] = frame
+    (replay.folder / "odd.json").write_text(json.dumps(report), encoding="utf-8")
+    lines = replay("export", "odd.json", "--to", "tf", "--ros", ros).out.splitlines()[1:]
+    assert lines[-1].startswith("# r2: its frame ")
+    assert "cannot be typed: it" in lines[-1]
+    # that of r1 is alone, so that there is nothing to wait for
+    (command,) = (line for line in lines if not line.startswith("#"))
+    assert command.endswith(" r1/map")
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        (("--robots", ""), "--robots : expected names with commas between them"),
+        (("--robots", "r1,"), "--robots r1,: expected names"),
+        (("--to", "png", "--mode", "raw"), "--mode is how map_server maps hold cells"),
+        (("--to", "tf", "--mode", "raw"), "--mode is how map_server maps hold cells"),
+        (("--ros", "2"), "--ros is for which ROS transforms are"),
+        (("--to", "tf", "--robots", "r2", "--maps", "x.mcap"), "not with --to tf"),
+        (("--to", "tf", "--robots", ""), "--robots : expected names"),
+    ],
+)
+def test_flags_that_say_nothing_are_refused(replay: Program, outcome: Path, flags: tuple[str, ...], said: str) -> None:
+    ran = replay("export", outcome, *flags)
+    assert ran.status == 2
+    assert said in ran.error
+    assert not list(replay.folder.iterdir())
+
+
+def test_a_link_gives_its_own_name(replay: Program, outcome: Path) -> None:
+    for link in ("latest", "newest.mcap"):
+        (replay.folder / link).symlink_to(outcome)
+        assert replay("export", link).status == 0
+    assert {path.name for path in replay.folder.glob("*.pgm")} == {"latest.pgm", "newest.pgm"}
+
+
+def test_who_is_merged_later_is_not_said_to_be_left_out(replay: Program, outcome: Path) -> None:
+    ran = replay("export", outcome, "--at", "1", "--to", "png", "-o", "early")
+    assert "replay: not in the merged map at that time: r2" in ran.err.splitlines()
+    assert "not in the merged map" not in replay("export", outcome, "--to", "png", "-o", "late").err
+
+
+def test_a_time_before_the_first_merged_map_is_told_when_that_is(replay: Program, tmp_path: Path) -> None:
+    run = write_mcap(tmp_path / "late.mcap", [seen("r2", 0.0), seen("r1", 1.3), seen("r2", 2.0)])
+    out = replay.merge(run).mcap
+    ran = replay("export", out, "--at", "1")
+    assert ran.error == f"{out}: the first merged map is of 1.3 s after the first map"
+    assert replay("export", out, "--at", "1.3", "-o", "then").status == 0
+    first = replay("export", run, "--topic", "/r1/map", "--at", "1ns").error
+    time = first.rpartition("(")[2].removesuffix(")")
+    assert "the first map is of 2" in first
+    assert replay("export", run, "--topic", "/r1/map", "--at", time, "-o", "first").status == 0
