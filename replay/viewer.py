@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import os
+import shlex
 import socket
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
 from replay.errors import InputError, OutputError, UsageError
+from replay.interrupts import put_off
 from replay.path_errors import path_errors
 
 LOOPBACK = "127.0.0.1"
@@ -22,6 +25,7 @@ RRD_MAGIC = b"RRF"
 _MCAP_MAGIC = b"\x89MCAP0\r\n"
 _HEAD_BYTES = 16
 _START_S = 30.0
+_END_S = 5.0
 _POLL_S = 0.05
 _LIBRARY_LOG = "RUST_LOG"
 _NOBODY = f"http://{LOOPBACK}:9"  # nothing listens there
@@ -80,18 +84,13 @@ def view(paths: Sequence[Path]) -> None:
     """
     for path in paths:
         _refuse_unreadable(path)
-    names = " ".join(str(path) for path in paths)
+    names = shlex.join(map(str, paths))
     refuse_without_screen(
         f"copy {names} to where there is one, or look at it in a browser: rerun {names} --web-viewer --bind {LOOPBACK}"
     )
-    with tempfile.TemporaryFile() as log:
-        process = _started([*(str(path.resolve()) for path in paths), "--port", "auto"], log.fileno(), is_apart=False)
-        try:
-            status = process.wait()
-        except BaseException:
-            process.terminate()
-            process.wait()
-            raise
+    arguments = [*(str(path.resolve()) for path in paths), "--port", "auto"]
+    with tempfile.TemporaryFile() as log, _running(arguments, log.fileno(), is_apart=False) as process:
+        status = process.wait()
         if status != 0:
             log.seek(0)
             raise OutputError(f"the viewer ended with status {status}: {_last_words(log.read())}")
@@ -112,14 +111,12 @@ def open_live() -> str:
         free.bind((LOOPBACK, 0))
         port = free.getsockname()[1]
     arguments = ["--port", str(port), "--hide-welcome-screen", "--expect-data-soon"]
-    with tempfile.TemporaryFile() as log:
-        process = _started(arguments, log.fileno(), is_apart=True)
+    with tempfile.TemporaryFile() as log, _running(arguments, log.fileno(), is_apart=True) as process:
         deadline = time.monotonic() + _START_S
         while time.monotonic() < deadline and process.poll() is None:
             if _listens(port):
                 return live_address(port)
             time.sleep(_POLL_S)
-        process.terminate()
         log.seek(0)
         raise OutputError(f"the viewer does not start: {_last_words(log.read())}")
 
@@ -141,6 +138,29 @@ def import_silently() -> None:
 def live_address(port: int) -> str:
     """Return the address of a viewer on this machine."""
     return f"rerun+http://{LOOPBACK}:{port}/proxy"
+
+
+@contextmanager
+def _running(arguments: Sequence[str], log: int, *, is_apart: bool) -> Iterator[subprocess.Popen[bytes]]:
+    """Start the viewer; what is raised within this ends it, an interrupt too."""
+    process = None
+    try:
+        with put_off():
+            process = _started(arguments, log, is_apart=is_apart)
+        yield process
+    except BaseException:
+        if process is not None:
+            _end(process)
+        raise
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(_END_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def _started(arguments: Sequence[str], log: int, *, is_apart: bool) -> subprocess.Popen[bytes]:

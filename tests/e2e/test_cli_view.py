@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
+import shutil
+import signal
 import socket
 import stat
 import subprocess
@@ -11,6 +14,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import pytest
@@ -145,6 +149,37 @@ def test_one_that_cannot_be_started_is_an_error(tmp_path: Path, rrd: Path, monke
     monkeypatch.setattr(viewer, "program", lambda: tmp_path / "none")
     with pytest.raises(OutputError, match="cannot be started"):
         viewer.view([rrd])
+
+
+@LINUX
+def test_names_are_those_of_a_shell_where_a_command_is_told(
+    replay: Program, rrd: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    shutil.copy(rrd, tmp_path / "a run; ls.rrd")
+    said = replay("view", "a run; ls.rrd").error
+    assert shlex.split(said.partition("in a browser: ")[2])[:3] == ["rerun", "a run; ls.rrd", "--web-viewer"]
+
+
+@POSIX
+@pytest.mark.usefixtures("screen")
+@pytest.mark.parametrize("command", ["view", "merge"])
+def test_an_interrupt_while_the_viewer_starts_ends_it(
+    replay: Program, two: Path, rrd: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    note = tmp_path / "pid"
+    stand_in(tmp_path, monkeypatch, f'echo $$ > "{note}.new"; mv "{note}.new" "{note}"; exec sleep 60')
+
+    def interrupt() -> None:
+        wait_until(note.exists, lambda: "the viewer was not started")
+        os.kill(os.getpid(), signal.SIGINT)
+
+    Thread(target=interrupt, daemon=True).start()
+    done = replay(*(("view", rrd) if command == "view" else ("merge", two, "--view", "-o", "out.mcap")))
+    assert done.status == 130
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(note.read_text()), 0)
 
 
 # Live
