@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from datetime import datetime
+from inspect import GEN_CLOSED, getgeneratorstate
 from typing import TYPE_CHECKING
 
 from mapmerge.config import MergeConfig, ScaleChoice
@@ -156,6 +158,15 @@ class MergeRun(Iterator[Event]):
         self._written_trajectories = written_trajectories
         self._events: Generator[Event, None, None] | None = None
 
+    def __repr__(self) -> str:
+        runs = ", ".join(run.path.name for run in self.options.runs)
+        robots = ", ".join(self.options.robots or ()) or "all robots"
+        if self._events is None:
+            state = "not begun"
+        else:
+            state = "over" if getgeneratorstate(self._events) == GEN_CLOSED else "going on"
+        return f"<replay.MergeRun of {robots} in {runs}: {state}>"
+
     def __next__(self) -> Event:
         if self._events is None:
             from replay.pipeline import merge as events
@@ -217,20 +228,30 @@ class MergeRun(Iterator[Event]):
             raise UsageError("events of this run were taken already; call replay.merge anew and write that")
         from replay.execute import merge_into
         from replay.flags.values import html_path, mcap_path
-        from replay.sinks import open_sinks
+        from replay.sinks import OutputsExistError, Sink, open_sinks
 
         written = OutputOptions(
-            mcap_path(keywords.path("output", output)),
+            mcap_path(keywords.path("output", output), "output"),
             rrd=keywords.truth("rrd", rrd),
-            html=None if report is None else html_path(keywords.path("report", report)),
+            html=None if report is None else html_path(keywords.path("report", report), "report"),
             every_ns=keywords.nanoseconds("every_s", every_s),
             copy_maps=keywords.truth("copy_maps", copy_maps),
             force=keywords.truth("force", force),
         )
         trajectories: TrajectoryChoice = self._written_trajectories if rrd or report is not None else "none"
         options = replace(self.options, images=self._written_images, trajectories=trajectories)
-        self._events = _nothing()
-        return merge_into(lambda: open_sinks(written), options, written)
+
+        @contextmanager
+        def sinks() -> Iterator[Sequence[Sink]]:
+            with open_sinks(written) as opened:
+                self._events = _nothing()  # until here nothing was taken, and it can be written anew
+                self._events.close()
+                yield opened
+
+        try:
+            return merge_into(sinks, options, written)
+        except OutputsExistError as error:
+            raise OutputsExistError(error.existing, "force=True") from error
 
     def close(self) -> None:
         """End it, and close the recordings; harmless at any time."""

@@ -6,9 +6,9 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from replay.errors import UsageError
 from replay.interrupts import held_off
 from replay.outputs import refuse_alike, refuse_inputs, refuse_irreplaceable, refuse_unwritable
+from replay.sinks import OutputsExistError
 from replay.sinks.partial_file import PartialFile, output_errors, partial_name
 from replay.sinks.publication import aside_name, publish
 
@@ -32,7 +32,7 @@ def refuse_files(paths: Sequence[Path], inputs: Sequence[Path], *, force: bool) 
     refuse_irreplaceable(paths)
     existing = [str(path) for path in paths if os.path.lexists(path)]
     if existing and not force:
-        raise UsageError(f"there is already {', '.join(existing)}; give --force to replace, or another name")
+        raise OutputsExistError(existing)
     for path in paths:
         refuse_unwritable(path)
 

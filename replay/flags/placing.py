@@ -54,10 +54,11 @@ def add(parser: argparse.ArgumentParser) -> None:
 def placing_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return how maps are placed, as keywords of `RunOptions`."""
     from mapmerge.match import MATCHERS
+    from replay.arguments import none_of
     from replay.init_pose import InitPose
 
     if options.method not in MATCHERS:
-        raise UsageError(f"--method {options.method}: there is no such method; expected {', '.join(MATCHERS)}")
+        raise UsageError(f"--method: {none_of(options.method, list(MATCHERS))}")
     return {
         "init_poses": tuple(InitPose.parse(text) for text in options.init_pose),
         "use_tf": options.use_tf,

@@ -21,17 +21,17 @@ def read_flag(flag: str, text: str, parse: Callable[[str], _Value]) -> _Value:
         raise UsageError(f"{flag}: {error}") from error
 
 
-def mcap_path(path: Path) -> Path:
-    """Return the name of a new MCAP, if it is fit for one."""
+def mcap_path(path: Path, said: str = "--output") -> Path:
+    """Return the name of a new MCAP, if it is fit for one; ``said`` is how it was given."""
     if path.suffix != ".mcap":
-        raise UsageError(f"--output {path}: expected a name that ends in .mcap")
+        raise UsageError(f"{said} {path}: expected a name that ends in .mcap")
     return path
 
 
-def html_path(path: Path) -> Path:
-    """Return the name of a new report to look at, if it is fit for one."""
+def html_path(path: Path, said: str = "--report") -> Path:
+    """Return the name of a new report to look at, if it is fit for one; ``said`` is how it was given."""
     if path.suffix != ".html":
-        raise UsageError(f"--report {path}: expected a name that ends in .html")
+        raise UsageError(f"{said} {path}: expected a name that ends in .html")
     return path
 
 

@@ -19,6 +19,7 @@ from replay.sinks.publication import aside_name, publish
 
 __all__ = [
     "SINKS",
+    "OutputsExistError",
     "Sink",
     "all_output_paths",
     "claim",
@@ -36,6 +37,22 @@ SINKS: dict[str, str] = {
     "json": "replay.sinks.json_file:JsonSink",
 }
 """In the order in which they are published: where the last one is, the others are, of the same run."""
+
+
+class OutputsExistError(UsageError):
+    """Files would be replaced, which was not asked for.
+
+    Parameters
+    ----------
+    existing
+        Their names.
+    force
+        How to ask for it.
+    """
+
+    def __init__(self, existing: Sequence[str], force: str = "--force") -> None:
+        super().__init__(f"there is already {', '.join(existing)}; give {force} to replace, or another name")
+        self.existing = existing
 
 
 def output_paths(options: OutputOptions) -> dict[str, Path]:
@@ -69,8 +86,7 @@ def refuse_existing(options: OutputOptions) -> None:
     # a link that leads nowhere is there, too
     existing = [str(path) for path in all_output_paths(options) if os.path.lexists(path)]
     if existing and not options.force:
-        names = "another name" if options.html is None else "other names"
-        raise UsageError(f"there is already {', '.join(existing)}; give --force to replace, or {names}")
+        raise OutputsExistError(existing)
 
 
 @contextmanager

@@ -370,7 +370,8 @@ class TestOtherSettings:
     def test_no_method(self, replay: Program, two: Path) -> None:
         ran = replay.merge(two, "--method", "magic")
         assert ran.status == 2
-        assert ran.error.startswith("--method magic: there is no such method; expected ")
+        assert ran.error.startswith("--method: 'magic' is none of correlation, ")
+        assert replay.merge(two, "--method", "papre").error.endswith("; did you mean paper?")
         for name in MATCHERS:
             assert name in ran.error
 

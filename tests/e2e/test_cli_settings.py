@@ -158,7 +158,10 @@ def test_texts_are_escaped(replay: Program) -> None:
         ("robots = [1]", "robots is [1]; expected a list of texts"),
         ("[placing]\ninit_poses = ['r2=1']", "placing.init_poses: r2=1: expected R=X,Y,YAW"),
         ("[placing]\ninit_poses = ['r9=1,2,3']", "placing.init_poses: r9: no such robot is merged"),
-        ("[merge]\nmethod = 'papr'", "merge.method: papr: there is no such method; expected correlation"),
+        (
+            "[merge]\nmethod = 'papr'",
+            "merge.method: 'papr' is none of correlation, existing, paper; did you mean paper",
+        ),
         ("[merge]\nscale_range = [1]", "merge.scale_range is [1]; expected a list of 2 numbers"),
         ("[merge.verify]\nmin_confidence = 2", "merge.verify.min_confidence: 2: expected a probability above 0"),
         ("[merge.verify]\nmin_overlap_m2 = true", "merge.verify.min_overlap_m2 is true; expected a number"),

@@ -76,13 +76,28 @@ def test_only_what_was_not_begun_can_be_written(tmp_path: Path) -> None:
 def test_files_that_exist_are_kept(tmp_path: Path) -> None:
     output = tmp_path / "b.mcap"
     output.write_text("mine", encoding="utf-8")
-    with pytest.raises(replay.UsageError, match="already"):
-        replay.merge(SAMPLE).write(output, rrd=False)
-    with pytest.raises(replay.UsageError, match=r"ends in \.mcap"):
-        replay.merge(SAMPLE).write(tmp_path / "b.bag")
+    run = replay.merge(SAMPLE, stop=20)
+    with pytest.raises(replay.UsageError, match=r"there is already .*; give force=True to replace, or another name"):
+        run.write(output, rrd=False)
+    with pytest.raises(replay.UsageError, match=r"^output .*b\.bag: expected a name that ends in \.mcap"):
+        run.write(tmp_path / "b.bag")
+    with pytest.raises(replay.UsageError, match=r"^report .*b\.txt: expected a name that ends in \.html"):
+        run.write(tmp_path / "c.mcap", report=tmp_path / "b.txt")
+    with pytest.raises(replay.OutputError, match="no file can have this name"):
+        run.write("a\0.mcap")
     assert output.read_text(encoding="utf-8") == "mine"
-    replay.merge(SAMPLE, stop=20).write(output, rrd=False, force=True)
+    run.write(output, rrd=False, force=True)  # nothing of it was taken yet
     assert output.stat().st_size > 1000
+
+
+def test_a_run_says_what_it_is() -> None:
+    run = replay.merge(SAMPLE, robots=["r1", "r2"], stop=20)
+    assert repr(run) == "<replay.MergeRun of r1, r2 in two_robots.mcap: not begun>"
+    next(run)
+    assert repr(run).endswith(": going on>")
+    run.close()
+    assert repr(run).endswith(": over>")
+    assert repr(replay.merge(SAMPLE)) == "<replay.MergeRun of all robots in two_robots.mcap: not begun>"
 
 
 def test_recordings_may_be_one_or_several_or_by_robot() -> None:
