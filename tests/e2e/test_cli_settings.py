@@ -160,7 +160,7 @@ def test_texts_are_escaped(replay: Program) -> None:
         ("[placing]\ninit_poses = ['r9=1,2,3']", "placing.init_poses: r9: no such robot is merged"),
         (
             "[merge]\nmethod = 'papr'",
-            "merge.method: 'papr' is none of correlation, existing, paper; did you mean paper",
+            "merge.method: 'papr' is none of correlation, existing, paper; did you mean",
         ),
         ("[merge]\nscale_range = [1]", "merge.scale_range is [1]; expected a list of 2 numbers"),
         ("[merge.verify]\nmin_confidence = 2", "merge.verify.min_confidence: 2: expected a probability above 0"),
