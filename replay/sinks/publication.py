@@ -10,7 +10,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
-from replay.sinks.partial_file import PartialFile, output_errors, sync_folder
+from replay.sinks.partial_file import DESCRIPTORS, PartialFile, output_errors, sync_folder
+
+DEVICES = Path("/dev")
 
 
 class Written(Protocol):
@@ -38,9 +40,15 @@ def why_irreplaceable(path: Path) -> str | None:
         return None
     if stat.S_ISDIR(status.st_mode):
         return "a folder has this name; remove it, or give another name"
-    if stat.S_ISLNK(status.st_mode):
-        return "this is a link, which no output replaces; give the name of a file, or remove the link"
-    return "this is a device, a pipe or the like, which no output replaces; give the name of a file"
+    if stat.S_ISLNK(status.st_mode) and not _is_stream(path):
+        return "this is a link, which no output replaces; give the name of the file itself, or remove the link"
+    return "this is a device, a pipe or the like; outputs are files: give the name of one, and print that afterwards"
+
+
+def _is_stream(path: Path) -> bool:
+    """Tell whether a link leads to what is no file, or may be standard output, though that be a file."""
+    leads_elsewhere = path.exists() and not path.is_file() and not path.is_dir()
+    return leads_elsewhere or path.absolute().parent in {DEVICES, DESCRIPTORS}
 
 
 def publish(written: Sequence[Written], files: Sequence[PartialFile], paths: Sequence[Path]) -> None:

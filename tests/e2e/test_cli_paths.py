@@ -198,6 +198,7 @@ def test_findings_are_not_written_to_devices(replay: Program, outcome: Path, nam
     assert Path(name).lstat().st_ino == before.st_ino
     if ran.status:  # where standard output is a file, it is appended to as any
         assert ran.error.startswith(f"{name}: this is ")
+        assert ran.error.endswith(", and print that afterwards")
 
 
 def test_outputs_of_settings_with_names_that_no_file_can_have(replay: Program, two: Path) -> None:
