@@ -9,7 +9,7 @@ from pathlib import Path
 from replay.errors import InputError, OutputError, ReplayError, UsageError
 from replay.options import OutputOptions
 from replay.path_errors import path_errors
-from replay.sinks import all_output_paths, refuse_existing, reserved_paths
+from replay.sinks import refuse_existing, reserved_paths
 from replay.sinks.publication import why_irreplaceable
 
 _Identity = tuple[int, int]
@@ -23,11 +23,11 @@ def refuse_outputs(outputs: OutputOptions, inputs: Sequence[Path]) -> None:
     ReplayError
         With the reason.
     """
-    refuse_inputs(reserved_paths(outputs), inputs)
-    paths = all_output_paths(outputs)
-    refuse_irreplaceable(paths)
+    reserved = reserved_paths(outputs)
+    refuse_inputs(reserved, inputs)
+    refuse_irreplaceable(reserved)
     refuse_existing(outputs)
-    for path in paths:
+    for path in reserved:
         refuse_unwritable(path)
 
 

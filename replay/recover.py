@@ -94,7 +94,7 @@ def recover(damaged: Path, output: Path, *, force: bool = False) -> Recovery:
     is_partial = _recovers_partial(output, damaged)
     own = {partial_name(output)} if is_partial else set[Path]()
     refuse_inputs([path for path in reserved_paths(options) if path not in own], [damaged])
-    refuse_irreplaceable(all_output_paths(options))
+    refuse_irreplaceable(reserved_paths(options))
     refuse_existing(options)
     refuse_unwritable(output)
     removed: list[str] = []

@@ -27,13 +27,14 @@ def refuse_files(paths: Sequence[Path], inputs: Sequence[Path], *, force: bool) 
         With the reason.
     """
     reserved = [reserved_names(path) for path in paths]
-    refuse_inputs([name for names in reserved for name in names], inputs)
+    every = [name for names in reserved for name in names]
+    refuse_inputs(every, inputs)
     refuse_alike(reserved)
-    refuse_irreplaceable(paths)
+    refuse_irreplaceable(every)
     existing = [str(path) for path in paths if os.path.lexists(path)]
     if existing and not force:
         raise OutputsExistError(existing)
-    for path in paths:
+    for path in every:
         refuse_unwritable(path)
 
 

@@ -189,6 +189,21 @@ def test_what_is_no_file_is_neither_replaced_nor_opened(
 
 
 @needs_posix
+@pytest.mark.parametrize("ending", [".mcap.partial", ".json.replaced", ".mcap.recovering"])
+def test_names_that_are_taken_meanwhile_are_refused_at_the_start(
+    replay: Program, two: Path, tmp_path: Path, ending: str
+) -> None:
+    name = f"out{ending}"
+    os.mkfifo(tmp_path / name)
+    flags = (*MERGE, "-o", "out.mcap", "--force")
+    assert replay("merge", two, *flags).error.startswith(f"{name}: this is a device, a pipe or the like")
+    (tmp_path / name).unlink()
+    (tmp_path / name).mkdir()
+    assert replay("merge", two, *flags).error == f"{name}: a folder has this name; remove it, or give another name"
+    assert [each.name for each in tmp_path.iterdir()] == [name]
+
+
+@needs_posix
 @pytest.mark.parametrize("name", ["/dev/null", "/dev/stdout"])
 @pytest.mark.parametrize("flag", ["--junit", "--summary"])
 def test_findings_are_not_written_to_devices(replay: Program, outcome: Path, name: str, flag: str) -> None:

@@ -440,7 +440,7 @@ class TestRefused:
         assert [each.name for each in tmp_path.iterdir()] == ["x.mcap"]
 
     def test_what_is_not_there(self, replay: Program) -> None:
-        assert "No such file" in replay("recover", "x.mcap").error
+        assert "it does not exist" in replay("recover", "x.mcap").error
 
     @pytest.mark.parametrize("there", ["out.mcap", "out.json", "out.rrd"])
     def test_to_replace_anything_unless_asked_to(self, replay: Program, tmp_path: Path, there: str) -> None:
