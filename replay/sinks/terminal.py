@@ -180,9 +180,7 @@ class Narrator:
             f"{placed} of {counted(len(report['robots']), 'map')} {'is' if placed == 1 else 'are'} in the merged map"
         )
         if len(report["robots"]) == 1:
-            self.say(
-                "there is one robot's map alone, so that nothing was merged with it; `replay info` lists all topics"
-            )
+            self.say("there is one robot's map alone: nothing was merged with it; `replay info` lists all topics")
         for line in what_to_do(report):
             self.say(line)
         spent_s = perf_counter() - self._begin_s
