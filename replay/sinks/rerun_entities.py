@@ -3,10 +3,12 @@
 ::
 
     merged                          the merged frame
-    ├── map                         the merged map
+    ├── map                         the merged map, as of some time
+    │   └── changes/<patch>         what changed in it since
     ├── overlap                     where several maps agree, and where they contradict each other
     ├── robots/<robot>              merged_from_map or, of a map that is not placed, where it is parked
-    │   ├── map                     the robot's own map
+    │   ├── map                     the robot's own map, as of some time
+    │   │   └── changes/<patch>     what changed in it since
     │   ├── walls/<tile>            its occupied cells in the robot's colour
     │   ├── path/<piece>            where it drove, in pieces
     │   └── position                where it is
@@ -51,6 +53,11 @@ ABOUT: EntityPath = ["about"]
 LIMIT_COLOUR: Rgb = (150, 150, 150)
 GROUND: Rgb = (23, 23, 23)
 """What lies behind the maps, and of a map what it does not know."""
+
+
+def changes(path: EntityPath, patch: int) -> EntityPath:
+    """Return where a patch upon a map is."""
+    return [*path, "changes", str(patch)]
 
 
 @dataclass(frozen=True, slots=True)

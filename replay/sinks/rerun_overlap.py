@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import rerun as rr
 
@@ -12,6 +10,7 @@ from mapmerge.overlap import AGREE, CONTRADICT, overlap
 from mapmerge.result import MergeResult
 from mapmerge.warp import Layer
 from replay.sinks.rerun_entities import OVERLAP
+from replay.sinks.rerun_grids import grid_map
 from replay.sinks.rerun_stream import RrdStream
 
 MAX_SIDE_CELLS = 1024
@@ -19,8 +18,6 @@ MAX_SIDE_CELLS = 1024
 
 _HEIGHT_M = 0.3
 _TINT = {AGREE: (40, 190, 95, 54), CONTRADICT: (255, 40, 40, 255)}
-# The library mixes what is below in only where the whole is not quite opaque.
-_OPACITY = 0.995
 
 
 class OverlapScene:
@@ -69,18 +66,13 @@ class OverlapScene:
             self._is_shown = False
             return
         self._is_shown = True
-        rows, cols = found.kinds.shape
-        pose = found.merged_from_grid
-        half_rad = pose.yaw_rad / 2
         self._stream.log(
             OVERLAP,
-            rr.GridMap(
-                data=self._colours[found.kinds[::-1]].tobytes(),
-                format=rr.components.ImageFormat(width=cols, height=rows, color_model="RGBA", channel_datatype="U8"),
-                cell_size=found.resolution_m,
-                translation=[pose.x_m, pose.y_m, _HEIGHT_M],
-                quaternion=rr.Quaternion(xyzw=[0.0, 0.0, math.sin(half_rad), math.cos(half_rad)]),
+            grid_map(
+                self._colours[found.kinds].view(np.uint8).reshape(*found.kinds.shape, 4),
+                found.resolution_m,
+                found.merged_from_grid,
                 draw_order=2.0,
-                opacity=_OPACITY,
+                height_m=_HEIGHT_M,
             ),
         )

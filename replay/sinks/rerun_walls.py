@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import rerun as rr
 
 from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
-from mapmerge.lattice import changed_box, offset_cells
-from mapmerge.plane import Box
 from mapmerge.sim2 import Points
 from mapmerge.walls import thinned
 from replay.sinks.rerun_entities import RobotEntities
+from replay.sinks.rerun_lattice import Change, Corner, Tile, covered, tile_box, tile_name, tiles_of
 from replay.sinks.rerun_stream import RrdStream
 
 POINTS_ACROSS = 2000
@@ -28,8 +25,6 @@ _STEP_M = 0.005
 # wide, so that those of the others are seen on them.
 _REFERENCE_RADIUS = rr.Radius.ui_points(1.4)
 _RADIUS = rr.Radius.ui_points(0.75)
-
-_Tile = tuple[int, int]
 
 
 class WallScene:
@@ -51,52 +46,43 @@ class WallScene:
         self._occupied_percent = cells.min_occupied_percent
         self._height_m = _HEIGHT_M + _STEP_M * entities.index
         self._radius = _RADIUS if entities.index else _REFERENCE_RADIUS
-        self._grid: Grid | None = None
-        self._first = (0, 0)
         self._step = 1
-        self._shown: set[_Tile] = set()
+        self._shown: set[Tile] = set()
 
-    def show(self, grid: Grid) -> None:
-        """Log what differs from the map before; cells are counted on its lattice for as long as maps keep it."""
-        before, self._grid = self._grid, grid
+    def show(self, change: Change) -> None:
+        """Log what differs from the map before."""
+        grid, before = change.grid, change.before
         step = max(1, round(max(grid.cells.shape) / POINTS_ACROSS))
-        offset = None if before is None else offset_cells(before, grid)
-        changed = None if before is None else changed_box(before, grid)
-        if before is None or offset is None or changed is None or step != self._step:
-            self._first, self._step = (0, 0), step
-            self._show_all(grid)
+        if before is None or step != self._step:
+            self._step = step
+            self._show_all(change)
             return
-        first, self._first = self._first, (self._first[0] + offset[0], self._first[1] + offset[1])
-        for tile in self._tiles(changed.shifted(*self._first)):
-            rows_cols = self._occupied(grid, tile, self._first)
-            if not np.array_equal(rows_cols, self._occupied(before, tile, first)):
-                self._log(tile, grid, rows_cols)
+        for tile in tiles_of(change.box, self._side):
+            rows_cols = self._occupied(grid, tile, change.first)
+            if not np.array_equal(rows_cols, self._occupied(before, tile, change.first_before)):
+                self._log(tile, change, rows_cols)
 
-    def _show_all(self, grid: Grid) -> None:
-        whole = set(self._tiles(Box(0, 0, *grid.cells.shape)))
-        for tile in sorted(whole | self._shown):
-            self._log(tile, grid, self._occupied(grid, tile, self._first))
+    @property
+    def _side(self) -> int:
+        """Cells across a tile."""
+        return TILE_POINTS * self._step
 
-    def _tiles(self, box: Box) -> Iterator[_Tile]:
-        """Yield the tiles that a box of the lattice touches, as row and column of tiles."""
-        side = TILE_POINTS * self._step
-        if not box.is_empty:
-            for row in range(box.top // side, (box.bottom - 1) // side + 1):
-                yield from ((row, col) for col in range(box.left // side, (box.right - 1) // side + 1))
+    def _show_all(self, change: Change) -> None:
+        for tile in sorted({*tiles_of(change.whole, self._side), *self._shown}):
+            self._log(tile, change, self._occupied(change.grid, tile, change.first))
 
-    def _occupied(self, grid: Grid, tile: _Tile, first: tuple[int, int]) -> Points:
+    def _occupied(self, grid: Grid, tile: Tile, first: Corner) -> Points:
         """Return rows and columns on the lattice of a tile's occupied cells, shape (2, N)."""
-        side = TILE_POINTS * self._step
-        whole = Box(0, 0, *grid.cells.shape).shifted(*first)
-        part = Box(tile[0] * side, tile[1] * side, (tile[0] + 1) * side, (tile[1] + 1) * side).within(whole)
+        whole = covered(grid, first)
+        part = tile_box(tile, self._side).within(whole)
         if part.is_empty:
             return np.empty((2, 0))
         found = np.flatnonzero(grid.cells[part.slices(whole)] >= self._occupied_percent)
         row, col = np.divmod(found, part.shape[1])
         return np.stack([row + float(part.top), col + float(part.left)])
 
-    def _log(self, tile: _Tile, grid: Grid, rows_cols: Points) -> None:
-        path = [*self._entities.walls, f"{tile[0]}_{tile[1]}"]
+    def _log(self, tile: Tile, change: Change, rows_cols: Points) -> None:
+        path = [*self._entities.walls, tile_name(tile)]
         if rows_cols.size == 0:
             if tile in self._shown:
                 self._shown.remove(tile)
@@ -106,7 +92,7 @@ class WallScene:
         points = rows_cols[::-1].T + 0.5
         if self._step > 1:
             points = thinned(points, self._step)
-        row, col = self._first
+        grid, (row, col) = change.grid, change.first
         points_m = grid.map_from_grid.apply((points - (col, row)) * grid.resolution_m)
         self._stream.log(
             path,

@@ -31,7 +31,7 @@ from replay.sinks.rerun_entities import GROUND
 from replay.sinks.rerun_file import RerunSink
 from replay.sinks.rerun_labels import label_places_m
 from replay.sinks.rerun_layout import Box, lay_out
-from replay.sinks.rerun_maps import MAX_SIDE_CELLS
+from replay.sinks.rerun_patches import LEAST_CELLS, MAX_SIDE_CELLS
 from replay.sinks.rerun_paths import PIECE_POSES
 from replay.sinks.rerun_stream import RrdStream
 from replay.skip_cause import SkipCause
@@ -157,7 +157,12 @@ def test_every_entity_is_documented(recording: Path, tmp_path: Path) -> None:
     named = [name for row in rows for name in re.findall(r"`(/[^`]+)`", row.split("|")[1])]
     patterns = {name: re.compile(re.sub(r"<\w+>", r"(?:[^/\\\\]|\\\\.)+", name)) for name in named}
     driven = written(tmp_path / "driven.rrd", events_in("driven"))
-    found = {chunk.entity_path for path in (recording, driven) for chunk in RrdReader(path).stream()}
+    side = 2 * int(LEAST_CELLS**0.5)
+    changed = np.zeros((side, side), np.int8)
+    changed[3, 4] = 100
+    ticks = {STAMPS[0]: {"r1": filled(0, side, side)}, STAMPS[1]: {"r1": Grid(changed, 0.05)}}
+    large = written(tmp_path / "large.rrd", events_of(["r1"], ticks))
+    found = {chunk.entity_path for path in (recording, driven, large) for chunk in RrdReader(path).stream()}
     assert {path for path in found if not any(pattern.fullmatch(path) for pattern in patterns.values())} == set()
     unused = {name for name, pattern in patterns.items() if not any(map(pattern.fullmatch, found))}
     assert unused == {"/plots/acceptance/limit"}, "the method that is used states a confidence"

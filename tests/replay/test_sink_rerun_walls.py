@@ -13,6 +13,7 @@ from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
 from mapmerge.sim2 import Sim2
 from replay.sinks.rerun_entities import RobotEntities
+from replay.sinks.rerun_lattice import Lattice
 from replay.sinks.rerun_walls import POINTS_ACROSS, TILE_POINTS, WallScene
 
 SIDE = 3 * TILE_POINTS
@@ -26,6 +27,7 @@ class Shown:
     def __init__(self) -> None:
         self.points_m: dict[str, np.ndarray] = {}
         self.logged: list[str] = []
+        self.lattice = Lattice()
         self.scene = WallScene(self, RobotEntities("r1", 0), CellConfig())  # type: ignore[arg-type]
 
     def log(self, path: Sequence[str], *content: Any) -> None:
@@ -39,7 +41,7 @@ class Shown:
 
     def show(self, grid: Grid) -> list[str]:
         self.logged.clear()
-        self.scene.show(grid)
+        self.scene.show(self.lattice.take(grid))
         return self.logged
 
     @property
