@@ -3,9 +3,8 @@
 ::
 
     merged                          the merged frame
-    ├── map                         the merged map, as of some time
+    ├── map                         the merged map, as of some time, green where maps agree and red where not
     │   └── changes/<patch>         what changed in it since
-    ├── overlap                     where several maps agree, and where they contradict each other
     ├── robots/<robot>              merged_from_map or, of a map that is not placed, where it is parked
     │   ├── map                     the robot's own map, as of some time
     │   │   └── changes/<patch>     what changed in it since
@@ -39,7 +38,6 @@ EntityPath = list[str]
 
 MERGED: EntityPath = ["merged"]
 MERGED_MAP: EntityPath = ["merged", "map"]
-OVERLAP: EntityPath = ["merged", "overlap"]
 SUMMARY: EntityPath = ["summary"]
 LEGEND: EntityPath = ["legend"]
 STATUS: EntityPath = ["status"]

@@ -25,7 +25,6 @@ from replay.sinks.rerun_entities import ABOUT, DECISIONS, LEGEND, ROBOTS, SKIPPE
 from replay.sinks.rerun_errors import rerun_errors
 from replay.sinks.rerun_live import LiveStream
 from replay.sinks.rerun_maps import MapScene
-from replay.sinks.rerun_overlap import OverlapScene
 from replay.sinks.rerun_paths import PathScene
 from replay.sinks.rerun_plots import Plots
 from replay.sinks.rerun_status import Statuses
@@ -83,8 +82,7 @@ class _Writer:
         self.stream = stream
         self._robots = {entities.robot: entities for entities in robots}
         cells = CellConfig(**merge["cells"])
-        self._maps = MapScene(self.stream, robots, cells)
-        self._overlap = OverlapScene(self.stream, cells, merge["verify"]["tolerance_m"])
+        self._maps = MapScene(self.stream, robots, cells, merge["verify"]["tolerance_m"])
         self._paths = PathScene(self.stream, robots)
         limit_of = "confidence" if merge["method"] in CALIBRATED else "acceptance"
         self._plots = Plots(self.stream, robots, limit_of, merge["verify"][f"min_{limit_of}"])
@@ -138,7 +136,6 @@ class _Writer:
         self._start_ns = event.stamp_ns if self._start_ns is None else self._start_ns
         self._stamp_ns = event.stamp_ns
         self._maps.show(event.result)
-        self._overlap.show(event.result)
         self._paths.show(event.moved, self._maps.shown)
         if event.moved and not self._has_ways:
             self._has_ways = True

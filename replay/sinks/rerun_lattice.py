@@ -45,6 +45,10 @@ class Change:
         """Return a box of the lattice, counted from the map's first cell."""
         return box.shifted(-self.first[0], -self.first[1])
 
+    def on_lattice(self, box: Box) -> Box:
+        """Return a box that is counted from the map's first cell, on the lattice."""
+        return box if box.is_empty else box.shifted(*self.first)
+
     def cells(self, box: Box) -> Cells:
         """Return what the map says in a box of the lattice, unknown where it is beyond the map."""
         return read(self.grid.cells, self.own(box), UNKNOWN)

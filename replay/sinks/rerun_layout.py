@@ -19,6 +19,7 @@ _MARGIN = 1.16
 _EYE_FIELD_RAD = math.radians(55.0)
 _EYE_ASPECT = 1.3
 _LABEL_SHARE = 0.08
+_BEFORE_SHARE = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +36,26 @@ class Box:
         """Return the smallest box that holds these points."""
         low, high = points_m.min(axis=0), points_m.max(axis=0)
         return Box(float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+
+    def joined(self, other: Box | None) -> Box:
+        """Return the smallest box that holds both."""
+        if other is None:
+            return self
+        return Box(
+            min(self.x0_m, other.x0_m),
+            min(self.y0_m, other.y0_m),
+            max(self.x1_m, other.x1_m),
+            max(self.y1_m, other.y1_m),
+        )
+
+    def within(self, other: Box, margin_m: float) -> Box:
+        """Return what of the box is at most so far outside of another one, which it meets."""
+        return Box(
+            max(self.x0_m, other.x0_m - margin_m),
+            max(self.y0_m, other.y0_m - margin_m),
+            min(self.x1_m, other.x1_m + margin_m),
+            min(self.y1_m, other.y1_m + margin_m),
+        )
 
     @property
     def width_m(self) -> float:
@@ -150,6 +171,14 @@ def _columns(boxes: Mapping[str, Box], limit_m: float, gap_m: float) -> list[lis
 
 def _stacked_m(column: Sequence[str], boxes: Mapping[str, Box], gap_m: float) -> float:
     return sum(boxes[name].height_m for name in column) + gap_m * (len(column) - 1)
+
+
+def in_view(now: Box, ever: Box) -> Box:
+    """Return what to look at: all that is shown in the end, and what was shown before, if it is not much farther off.
+
+    Maps are parked beside smaller ones at first, some of them beyond what the merged map covers in the end.
+    """
+    return ever.within(now, _BEFORE_SHARE * max(now.width_m, now.height_m))
 
 
 def eye(extent: Box) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

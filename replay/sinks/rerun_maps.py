@@ -18,7 +18,8 @@ from replay.sinks.rerun_grids import quaternion
 from replay.sinks.rerun_labels import PointM, known_places_m
 from replay.sinks.rerun_lattice import Lattice
 from replay.sinks.rerun_layout import Box as Extent
-from replay.sinks.rerun_layout import Layout, lay_out
+from replay.sinks.rerun_layout import Layout, in_view, lay_out
+from replay.sinks.rerun_overlap import Tint
 from replay.sinks.rerun_patches import PatchedMap
 from replay.sinks.rerun_stream import RrdStream
 from replay.sinks.rerun_walls import WallScene
@@ -52,14 +53,19 @@ class MapScene:
         The robots, the reference first.
     cells
         When a cell counts as occupied.
+    tolerance_m
+        How far a wall may lie from the same wall in another map.
     """
 
-    def __init__(self, stream: RrdStream, robots: Sequence[RobotEntities], cells: CellConfig) -> None:
+    def __init__(
+        self, stream: RrdStream, robots: Sequence[RobotEntities], cells: CellConfig, tolerance_m: float
+    ) -> None:
         self._stream = stream
         self._robots = robots
         self._merged: Grid | None = None
         self._merged_lattice = Lattice()
-        self._merged_map = PatchedMap(stream, MERGED_MAP, cells, draw_order=_MERGED_ORDER)
+        self._tint = Tint(cells, tolerance_m)
+        self._merged_map = PatchedMap(stream, MERGED_MAP, cells, _MERGED_ORDER, self._tint.paint)
         self._laid_out: Mapping[str, RobotOutcome] | None = None
         self._shown = {entities.robot: _Shown() for entities in robots}
         self._lattices = {entities.robot: Lattice() for entities in robots}
@@ -68,13 +74,14 @@ class MapScene:
             for entities in robots
         }
         self._walls = {entities.robot: WallScene(stream, entities, cells) for entities in robots}
-        self._extent: Extent | None = None
+        self._now: Extent | None = None
+        self._ever: Extent | None = None
         stream.log(MERGED, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
     @property
     def extent(self) -> Extent | None:
-        """What all maps cover now; None without maps."""
-        return self._extent
+        """What to look at, for all maps to be in view now and, if possible, at all times; None without maps."""
+        return None if self._now is None else in_view(self._now, self._now.joined(self._ever))
 
     @property
     def shown(self) -> set[str]:
@@ -83,7 +90,7 @@ class MapScene:
 
     def show(self, result: MergeResult) -> None:
         """Log what differs from what was logged before."""
-        self._show_merged(result.merged)
+        self._show_merged(result)
         for entities in self._robots:
             if entities.robot in result.updated:
                 self._show_map(entities, result.grids[entities.robot])
@@ -94,14 +101,16 @@ class MapScene:
         corners_m = {robot: shown.corners_m for robot, shown in self._shown.items() if shown.corners_m is not None}
         places_m = {robot: shown.places_m for robot, shown in self._shown.items() if shown.places_m is not None}
         layout = lay_out(result, corners_m, places_m)
-        self._extent = layout.extent
+        self._now = layout.extent
+        self._ever = self._ever if self._now is None else self._now.joined(self._ever)
         for entities in self._robots:
             self._show_pose(entities, layout)
             self._show_label(entities, result.robots[entities.robot], layout)
 
-    def _show_merged(self, merged: Grid | None) -> None:
-        if merged is not None and merged is not self._merged:
-            self._merged_map.show(self._merged_lattice.take(merged))
+    def _show_merged(self, result: MergeResult) -> None:
+        merged, repainted = result.merged, self._tint.update(result)
+        if merged is not None and (merged is not self._merged or not repainted.is_empty):
+            self._merged_map.show(self._merged_lattice.take(merged), repainted)
             self._merged = merged
 
     def _show_map(self, entities: RobotEntities, grid: Grid) -> None:

@@ -1,78 +1,140 @@
-"""Where maps agree and contradict each other in the Rerun recording: a tint over the merged map."""
+"""The merged map in the Rerun recording is green where maps agree and red where they contradict each other.
+
+The tint is part of the map's picture. As a see-through picture of its own above the map it would vanish at times: the
+viewer draws each of several pictures a little nearer than it lies, and see-through ones where they lie.
+"""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-import rerun as rr
 
 from mapmerge.config import CellConfig
-from mapmerge.overlap import AGREE, CONTRADICT, overlap
+from mapmerge.grid import Grid
+from mapmerge.overlap import AGREE, ALONE, CONTRADICT, Overlap, overlap
+from mapmerge.plane import NOTHING, Box
 from mapmerge.result import MergeResult
 from mapmerge.warp import Layer
-from replay.sinks.rerun_entities import OVERLAP
-from replay.sinks.rerun_grids import grid_map
-from replay.sinks.rerun_stream import RrdStream
+from replay.sinks.rerun_grids import Pixels, shades_of
 
 MAX_SIDE_CELLS = 1024
 """Larger maps are compared in larger cells: it is a tint."""
 
-_HEIGHT_M = 0.3
-_TINT = {AGREE: (40, 190, 95, 54), CONTRADICT: (255, 40, 40, 255)}
+_GREEN, _RED = (40, 190, 95), (255, 40, 40)
+_GREEN_SHARE = 0.21
 
 
-class OverlapScene:
-    """Logs the tint, when a map that is placed or a placement changed.
+class Tint:
+    """Where the placed maps agree and contradict each other, kept up to date.
 
     Parameters
     ----------
-    stream
-        The recording.
     cells
         When a cell counts as occupied.
     tolerance_m
         How far a wall may lie from the same wall in another map.
     """
 
-    def __init__(self, stream: RrdStream, cells: CellConfig, tolerance_m: float) -> None:
-        self._stream = stream
+    def __init__(self, cells: CellConfig, tolerance_m: float) -> None:
         self._cells = cells
         self._tolerance_m = tolerance_m
         self._layers: list[Layer] = []
-        self._is_shown = False
-        colours = np.zeros((256, 4), np.uint8)
-        for kind, colour in _TINT.items():
-            colours[kind] = colour
-        # four bytes as one number are looked up four times as fast
-        self._colours = colours.view(np.uint32).ravel()
+        self._found: Overlap | None = None
 
-    def show(self, result: MergeResult) -> None:
-        """Log the tint if it can differ from the one before."""
+    def update(self, result: MergeResult) -> Box:
+        """Bring it up to date; return in which cells of the merged map it is not what it was before."""
         layers = [
             Layer(result.grids[robot], outcome.merged_from_map)
             for robot, outcome in result.robots.items()
             if outcome.merged_from_map is not None and robot in result.grids
         ]
+        if result.merged is None:
+            return NOTHING
         before, self._layers = self._layers, layers
         if len(before) == len(layers) and all(map(Layer.is_same, before, layers)):
-            return
-        found = None
-        if result.merged is not None and len(layers) > 1:
-            found = overlap(
+            return NOTHING
+        last, self._found = self._found, None
+        if len(layers) > 1:
+            self._found = overlap(
                 layers, result.merged, self._cells, tolerance_m=self._tolerance_m, max_side_cells=MAX_SIDE_CELLS
             )
-        if found is None:
-            if self._is_shown:
-                self._stream.log(OVERLAP, rr.Clear(recursive=False))
-            self._is_shown = False
-            return
-        self._is_shown = True
-        self._stream.log(
-            OVERLAP,
-            grid_map(
-                self._colours[found.kinds].view(np.uint8).reshape(*found.kinds.shape, 4),
-                found.resolution_m,
-                found.merged_from_grid,
-                draw_order=2.0,
-                height_m=_HEIGHT_M,
-            ),
-        )
+        return _differs(last, self._found, result.merged)
+
+    def paint(self, grid: Grid) -> Pixels:
+        """Return a part of the merged map as a picture: in shades or, if some of it is tinted, in colours.
+
+        Parameters
+        ----------
+        grid
+            The part, in cells of any size along the axes of the merged map.
+
+        Returns
+        -------
+        pixels
+            Shape (rows, columns), or (rows, columns, 3) in red, green and blue; row 0 has the lowest y.
+        """
+        shades = shades_of(grid)
+        kinds = None if self._found is None else _sampled(self._found, grid)
+        return shades if kinds is None else _COLOURS[kinds, shades]
+
+
+def _colours() -> Pixels:
+    """Return the colour of each kind of cell and shade, shape (kinds, 256, 3)."""
+    shades = np.repeat(np.arange(256, dtype=np.float64)[:, None], 3, axis=1)
+    colours = np.stack([shades, shades * (1.0 - _GREEN_SHARE) + np.multiply(_GREEN, _GREEN_SHARE), shades])
+    colours[CONTRADICT] = _RED
+    return colours.round().astype(np.uint8)
+
+
+_COLOURS = _colours()
+
+
+def _sampled(found: Overlap, grid: Grid) -> Pixels | None:
+    """Return of which kind each cell of a grid is; None if all of them are alone."""
+    corner = found.merged_from_grid.inverse() @ grid.map_from_grid
+    rows, columns = (
+        np.floor((start_m + (np.arange(number) + 0.5) * grid.resolution_m) / found.resolution_m).astype(np.intp)
+        for start_m, number in ((corner.y_m, grid.rows), (corner.x_m, grid.cols))
+    )
+    inside = [(at >= 0) & (at < most) for at, most in zip((rows, columns), found.kinds.shape, strict=True)]
+    part = found.kinds[np.ix_(rows[inside[0]], columns[inside[1]])]
+    if not part.any():
+        return None
+    kinds = np.full(grid.cells.shape, ALONE, np.uint8)
+    kinds[np.ix_(*inside)] = part
+    # maps that agree may still leave a cell at their borders unknown; where they contradict each other, all is shown
+    kinds[(grid.cells < 0) & (kinds == AGREE)] = ALONE
+    return kinds
+
+
+def _differs(before: Overlap | None, after: Overlap | None, lattice: Grid) -> Box:
+    """Return in which cells of a map, along whose axes both lie, two overlaps are not the same."""
+    found = [each for each in (before, after) if each is not None]
+    boxes = [_cells_of(each, lattice) for each in found]
+    both = NOTHING if not boxes else boxes[0].union(boxes[-1])
+    if before is None or after is None or before.resolution_m != after.resolution_m:
+        return both
+    step = round(after.resolution_m / lattice.resolution_m)
+    if (boxes[0].top - boxes[1].top) % step or (boxes[0].left - boxes[1].left) % step:
+        return both
+    images = []
+    for each, box in zip(found, boxes, strict=True):
+        image = np.full((math.ceil(both.shape[0] / step), math.ceil(both.shape[1] / step)), ALONE, np.uint8)
+        top, left = (box.top - both.top) // step, (box.left - both.left) // step
+        image[top : top + each.kinds.shape[0], left : left + each.kinds.shape[1]] = each.kinds
+        images.append(image)
+    rows, columns = np.nonzero(images[0] != images[1])
+    if rows.size == 0:
+        return NOTHING
+    top, left, bottom, right = (int(edge) for edge in (rows.min(), columns.min(), rows.max() + 1, columns.max() + 1))
+    return Box(top * step, left * step, bottom * step, right * step).shifted(both.top, both.left)
+
+
+def _cells_of(found: Overlap, lattice: Grid) -> Box:
+    """Return which cells of a map an overlap covers, also beyond its borders."""
+    corner = lattice.map_from_grid.inverse() @ found.merged_from_grid
+    top, left = round(corner.y_m / lattice.resolution_m), round(corner.x_m / lattice.resolution_m)
+    step = round(found.resolution_m / lattice.resolution_m)
+    rows, columns = found.kinds.shape
+    return Box(top, left, top + rows * step, left + columns * step)

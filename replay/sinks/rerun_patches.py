@@ -10,19 +10,16 @@ entity, so that seams open between many of them. Of one map there are never more
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
-import cv2
-import numpy as np
 import rerun as rr
 
 from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
-from mapmerge.plane import Box
+from mapmerge.plane import NOTHING, Box
 from mapmerge.resample import in_bands
-from mapmerge.warp import Bytes
-from replay.sinks.rerun_entities import GROUND, EntityPath, changes
-from replay.sinks.rerun_grids import grid_map
+from replay.sinks.rerun_entities import EntityPath, changes
+from replay.sinks.rerun_grids import Pixels, grid_map, shades_of
 from replay.sinks.rerun_lattice import Change, Corner
 from replay.sinks.rerun_stream import RrdStream
 
@@ -34,17 +31,6 @@ LEAST_CELLS = 1 << 16
 """Smaller maps are logged as a whole each time: patches, each an entity, would save little."""
 
 _ORDER_STEP = 0.1
-
-# Of cells that are free, as likely free as occupied, and occupied.
-_FLOOR, _UNSURE, _WALL = 84, 50, 170
-
-
-def _shades() -> Bytes:
-    """Return the shade of each cell's byte: floors dim, walls light, what is not known as the ground behind the map."""
-    percent = np.arange(101)
-    shades = np.full(256, GROUND[0], np.uint8)
-    shades[:101] = np.interp(percent, (0, 50, 100), (_FLOOR, _UNSURE, _WALL)).astype(np.uint8)
-    return shades
 
 
 class PatchedMap:
@@ -63,21 +49,38 @@ class PatchedMap:
         When a cell counts as occupied.
     draw_order
         Maps with the higher one are drawn above; patches have up to half of one more.
+    paint
+        Returns the picture of a part of the map: of that alone, and of where it lies.
     """
 
-    def __init__(self, stream: RrdStream, path: EntityPath, cells: CellConfig, draw_order: float) -> None:
+    def __init__(
+        self,
+        stream: RrdStream,
+        path: EntityPath,
+        cells: CellConfig,
+        draw_order: float,
+        paint: Callable[[Grid], Pixels] = shades_of,
+    ) -> None:
         self._stream = stream
         self._path = path
         self._cells = cells
         self._draw_order = draw_order
-        self._shades = _shades()
+        self._paint = paint
         self._corner: Corner | None = None
         self._step = 1
         self._patches: dict[int, Box] = {}
         self._patched_cells = 0
 
-    def show(self, change: Change) -> None:
-        """Log what differs from what is shown; a map without cells is cleared."""
+    def show(self, change: Change, repainted: Box = NOTHING) -> None:
+        """Log what differs from what is shown; a map without cells is cleared.
+
+        Parameters
+        ----------
+        change
+            What is new about the map.
+        repainted
+            Its cells, counted from its first one, that are painted otherwise whatever they say.
+        """
         grid = change.grid
         if grid.cells.size == 0:
             self._clear_patches()
@@ -87,16 +90,18 @@ class PatchedMap:
         step = math.ceil(max(grid.cells.shape) / MAX_SIDE_CELLS)
         if change.before is None or self._corner is None or step != self._step:
             self._show_whole(change, step)
-        elif not change.box.is_empty:
-            self._show_changed(change, self._corner)
+        else:
+            box = change.box.union(change.on_lattice(repainted).within(change.whole))
+            if not box.is_empty:
+                self._show_changed(change, box, self._corner)
 
     def _show_whole(self, change: Change, step: int) -> None:
         self._clear_patches()
         self._corner, self._step, self._patched_cells = change.first, step, 0
         self._log(self._path, change, change.whole, self._draw_order)
 
-    def _show_changed(self, change: Change, corner: Corner) -> None:
-        box, taken = patch_for(_aligned(change.box, corner, self._step), self._patches)
+    def _show_changed(self, change: Change, changed: Box, corner: Corner) -> None:
+        box, taken = patch_for(_aligned(changed, corner, self._step), self._patches)
         self._patched_cells += math.prod(box.shape)
         whole_cells = change.grid.cells.size
         if whole_cells < LEAST_CELLS or self._patched_cells > whole_cells:
@@ -121,8 +126,7 @@ class PatchedMap:
         pose = change.pose(box)
         part = Grid(change.cells(box), change.grid.resolution_m, pose, is_own=True)
         shown = part if self._step == 1 else in_bands(part, self._step, self._cells)
-        shades = np.asarray(cv2.LUT(shown.cells.view(np.uint8), self._shades), np.uint8)
-        self._stream.log(path, grid_map(shades, shown.resolution_m, pose, draw_order=draw_order))
+        self._stream.log(path, grid_map(self._paint(shown), shown.resolution_m, pose, draw_order=draw_order))
 
 
 def patch_for(changed: Box, patches: Mapping[int, Box]) -> tuple[Box, set[int]]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mapmerge.outcome import ChangeKind
+from mapmerge.outcome import ChangeKind, Status
 from mapmerge.reasons import ReasonCode
 from replay.advice import ADVICE
 from replay.events import Report
@@ -119,7 +119,7 @@ def _is(values: Mapping[str, Any]) -> str:
 
 
 def _sure(values: Mapping[str, Any]) -> str:
-    if values["merged_from_map"] is None or values["placed_via"] is None:
+    if values["status"] == Status.REFERENCE:
         return NO_FIGURE
     if values["confidence"] is not None:
         return percent(values["confidence"])
