@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 from benchmarks.faults.kills import SAMPLE, killed_runs
 from benchmarks.faults.oracle import Judged, Verdict
 
-_FINALS = ("out.mcap", "out.rrd", "out.json")
+FINALS = ("out.mcap", "out.rrd", "out.json")
 _MOST_S = 120.0
 _ENDS = {0: Verdict.RIGHT, 2: Verdict.ERROR, 3: Verdict.ERROR}
 _LIMITED = (
@@ -184,7 +184,7 @@ def judged(ended: Ended, folder: Path, *, changed: bool = False, left: Sequence[
     out = folder / "out"
     if left is None:
         left = [each.name for each in out.iterdir()] if out.exists() else []
-    if sorted(left) not in ([], sorted(_FINALS)):
+    if sorted(left) not in ([], sorted(FINALS)):
         return Judged(Verdict.WRONG, f"it left {', '.join(left)}")
     if ended.status == 0 and not left:
         return Judged(Verdict.WRONG, "it says that it is done, and nothing is there")

@@ -19,7 +19,7 @@ _MARGIN = 1.16
 _EYE_FIELD_RAD = math.radians(55.0)
 _EYE_ASPECT = 1.3
 _LABEL_SHARE = 0.08
-_BEFORE_SHARE = 0.25
+_BEFORE_SHARE = 0.4
 
 
 @dataclass(frozen=True, slots=True)

@@ -476,7 +476,7 @@ class TestCommand:
         assert (tmp_path / "bag_none_emptied_0" / "run.bag").is_file()
 
     def test_nothing_new_is_begun_after_the_time(self, capsys):
-        assert command.main(["--seconds", "0", "--jobs", "1"]) == 0
+        assert command.main(["--seconds", "1e-9", "--jobs", "1"]) == 0
         assert "of 0: 0" in capsys.readouterr().out
 
 

@@ -170,7 +170,9 @@ def test_what_programs_read_is_whole_where_streams_know_no_more_than_ascii(tmp_p
     robots = ("größe", "𝄞")
     runs = [tmp_path / name for name in ("a.json", "b.json")]
     path = write_mcap(tmp_path / "run.mcap", [seen("r1", 0.0, topic="/größe/map"), seen("r2", 1.0, topic="/𝄞/map")])
-    (tmp_path / "truth.json").write_text(json.dumps({"reference": robots[0], "robots": {}}), encoding="utf-8")
+    (tmp_path / "truth.json").write_text(
+        json.dumps({"reference": robots[0], "robots": {robots[1]: {"same_place": False}}}), encoding="utf-8"
+    )
     (tmp_path / "expect.yaml").write_text("robots: {größe: {status: reference}}\n", encoding="utf-8")
 
     def said(*arguments: object) -> bytes:

@@ -81,9 +81,7 @@ shares = st.none() | st.floats(0.0, 1.0)
 def robot(name: str, status: str, pose: Sim2, share: float | None, time_s: float | None) -> RobotResult:
     is_placed = status in ("reference", "merged")
     reason = "accepted" if is_placed else "ambiguous"
-    return RobotResult(
-        name, status, reason, "", pose if is_placed else None, share, share, share, time_s, "map", "/map"
-    )
+    return RobotResult(name, status, reason, "", pose if is_placed else None, share, share, share, time_s, "map")
 
 
 @st.composite

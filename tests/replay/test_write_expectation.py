@@ -12,9 +12,9 @@ from replay.run_result import RobotResult, RunResult
 
 
 def result(name: str) -> RunResult:
-    reference = RobotResult("r1", "reference", "reference", "", Sim2(), 0.9, None, 10.0, None, "r1/map", "/r1/map")
+    reference = RobotResult("r1", "reference", "reference", "", Sim2(), 0.9, None, 10.0, None, "r1/map")
     pose = Sim2(-1.0004996, 2.5, 3.1, 1.0203)
-    robot = RobotResult(name, "merged", "accepted", "", pose, 0.987, 0.01, 10.4, 0.0, "map", "/map")
+    robot = RobotResult(name, "merged", "accepted", "", pose, 0.987, 0.01, 10.4, 0.0, "map")
     return RunResult(Path("out.json"), "r1", {"r1": reference, name: robot}, {"damaged": 3}, "1", {}, ())
 
 
