@@ -62,7 +62,8 @@ def merge(
     >>> print(result.robots["hall"].reason.message)
     not placed on kitchen: one of the maps shows no wall at all
     """
-    if isinstance(grids, (Grid, str)) or not isinstance(grids, Iterable):
+    is_one = isinstance(grids, np.ndarray) and grids.ndim == 2
+    if is_one or isinstance(grids, (Grid, str)) or not isinstance(grids, Iterable):
         raise ConfigError(f"grids are {shown(grids)}; expected several maps, or a mapping of names to maps")
     named = grids if isinstance(grids, Mapping) else {f"map{number}": grid for number, grid in enumerate(grids)}
     if not named:

@@ -17,11 +17,13 @@ from mapmerge.sim2 import Sim2
 from mapmerge.warp import Bytes, Layer, Warp, warped
 
 ALONE = 0
-"""At most one map knows the cell, or those that do say neither the same nor the contrary."""
+"""At most one map knows the cell."""
 AGREE = 1
 """Two maps or more know it as free, or have a wall within the tolerance, and none says the contrary."""
 CONTRADICT = 2
 """It is a wall of one map and, within the tolerance, free space of another."""
+SHARED = 3
+"""Two maps or more know it, and say neither the same nor the contrary: not all of them are sure of it."""
 
 _BAND_CELLS = 256
 
@@ -33,7 +35,7 @@ class Overlap:
     Parameters
     ----------
     kinds
-        Shape (rows, columns), uint8: `ALONE`, `AGREE` or `CONTRADICT`; row 0 has the lowest y.
+        Shape (rows, columns), uint8: `ALONE`, `AGREE`, `CONTRADICT` or `SHARED`; row 0 has the lowest y.
     resolution_m
         Side of a cell.
     merged_from_grid
@@ -118,7 +120,7 @@ def _compared(warps: Sequence[Warp], box: Box, reach: int, config: CellConfig) -
     """Return the kind of each cell, given how many cells off a wall may be."""
     around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
     any_wall, any_clear = np.zeros(box.shape, bool), np.zeros(box.shape, bool)
-    near_walls, free = np.zeros(box.shape, np.uint16), np.zeros(box.shape, np.uint16)
+    near_walls, free, known = (np.zeros(box.shape, np.uint16) for _ in range(3))
     for warp in warps:
         tile = warp.tile(box)
         if tile is None:
@@ -131,6 +133,10 @@ def _compared(warps: Sequence[Warp], box: Box, reach: int, config: CellConfig) -
         any_clear |= is_free & ~near
         near_walls += near
         free += is_free
+        known += cells > UNKNOWN
     contradict = any_wall & any_clear
     agree = ((free > 1) | (any_wall & (near_walls > 1))) & ~contradict
-    return np.where(contradict, np.uint8(CONTRADICT), agree.astype(np.uint8) * np.uint8(AGREE))
+    kinds = np.where(known > 1, np.uint8(SHARED), np.uint8(ALONE))
+    kinds[agree] = AGREE
+    kinds[contradict] = CONTRADICT
+    return kinds

@@ -154,5 +154,8 @@ def _opened(path: Path) -> Iterator[RecordFile]:
         if not size:
             raise InputError(f"{path}: it is empty, so there is nothing to recover")
         if magic != MAGIC:
-            raise InputError(f"{path}: it does not begin as an MCAP does; expected one that was cut off")
+            raise InputError(
+                f"{path}: it does not begin as an MCAP does; expected one that was cut off; "
+                "`replay merge` reads bags and .db3 files that were, as they are"
+            )
         yield RecordFile(path, file, size, written_bytes(file, size), MOST_BYTES)

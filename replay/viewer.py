@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import shutil
 import socket
 import subprocess
 import sys
@@ -74,6 +75,11 @@ def refuse_without_screen(instead: str, variables: Mapping[str, str] = os.enviro
         raise UsageError(f"there is no screen here (neither DISPLAY nor WAYLAND_DISPLAY is set); {instead}")
 
 
+def _command() -> str:
+    """Return how the viewer is called in a shell: by its name, or where it was installed if that is not searched."""
+    return "rerun" if shutil.which("rerun") else shlex.quote(str(Path(sys.executable).with_name("rerun")))
+
+
 def view(paths: Sequence[Path]) -> None:
     """Open recordings in a window, and wait until it is closed.
 
@@ -85,9 +91,8 @@ def view(paths: Sequence[Path]) -> None:
     for path in paths:
         _refuse_unreadable(path)
     names = shlex.join(map(str, paths))
-    refuse_without_screen(
-        f"copy {names} to where there is one, or look at it in a browser: rerun {names} --web-viewer --bind {LOOPBACK}"
-    )
+    in_browser = f"{_command()} {names} --web-viewer --bind {LOOPBACK}"
+    refuse_without_screen(f"copy {names} to where there is one, or look at it in a browser: {in_browser}")
     arguments = [*(str(path.resolve()) for path in paths), "--port", "auto"]
     with tempfile.TemporaryFile() as log, _running(arguments, log.fileno(), is_apart=False) as process:
         status = process.wait()

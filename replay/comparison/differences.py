@@ -168,7 +168,7 @@ def _moved(robot: str, one: Sim2, other: Sim2, at_m: tuple[float, float], tolera
     off = error_of(other, one, at_m)
     if off.within(tolerance.distance_m, tolerance.angle_deg) and abs(ratio - 1.0) <= tolerance.share:
         return
-    detail = f"by {off.distance_m:.3f} m (x {dx_m:+.3f}, y {dy_m:+.3f}), turned by {turn_deg:+.2f}°"
+    detail = f"by {off.distance_m:.3f} m amid its map (x {dx_m:+.3f}, y {dy_m:+.3f}), turned by {turn_deg:+.2f}°"
     if ratio != 1.0:
         detail += f", scaled by {ratio:.4f}"
     amounts = {"distance_m": off.distance_m, "dx_m": dx_m, "dy_m": dy_m, "turn_deg": turn_deg, "scale_ratio": ratio}

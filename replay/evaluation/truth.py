@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mapmerge.sim2 import IDENTITY, Sim2
@@ -58,14 +58,20 @@ class Truth:
     def seen_from(self, robot: str, file: Path) -> Truth:
         """Return the same with another robot as the reference.
 
+        If its map is of another place, all that are of the old reference's place are none of its own; of others of
+        other places nothing is known then.
+
         Raises
         ------
         InputError
-            If nothing is known of it, or its map is of another place.
+            If nothing is known of it.
         """
         if robot == self.reference:
             return self
         known = self.robots.get(robot)
+        if known is not None and known.reference_from_map is None:
+            there = {name: item for name, item in self.everybody().items() if item.reference_from_map is not None}
+            return Truth(robot, {name: replace(item, reference_from_map=None) for name, item in there.items()}, None)
         if known is None or known.reference_from_map is None:
             raise InputError(
                 f"{file}: it says nothing of how {robot}, the run's reference, lies to {self.reference}; merge with "

@@ -43,7 +43,7 @@ def refuse_left_out(left: Sequence[RunInput]) -> None:
     """Refuse that recordings were left out."""
     if left:
         names = listed([plain(item.name) for item in left])
-        raise UsageError(f"--maps: {names} was merged as well; give it with --maps, too")
+        raise UsageError(f"--maps: {names} was merged, and is not given; give what was merged, and nothing else")
 
 
 def _input(item: Mapping[str, Any]) -> RunInput:

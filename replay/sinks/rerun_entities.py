@@ -3,8 +3,9 @@
 ::
 
     merged                          the merged frame
-    ├── map                         the merged map, as of some time, green where maps agree and red where not
+    ├── map                         the merged map, as of some time, green where maps share ground
     │   └── changes/<patch>         what changed in it since
+    ├── contradictions              where they contradict each other
     ├── robots/<robot>              merged_from_map or, of a map that is not placed, where it is parked
     │   ├── map                     the robot's own map, as of some time
     │   │   └── changes/<patch>     what changed in it since
@@ -38,6 +39,7 @@ EntityPath = list[str]
 
 MERGED: EntityPath = ["merged"]
 MERGED_MAP: EntityPath = ["merged", "map"]
+CONTRADICTIONS: EntityPath = ["merged", "contradictions"]
 SUMMARY: EntityPath = ["summary"]
 LEGEND: EntityPath = ["legend"]
 STATUS: EntityPath = ["status"]

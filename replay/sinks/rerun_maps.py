@@ -13,13 +13,13 @@ from mapmerge.grid import Grid
 from mapmerge.outcome import RobotOutcome, Status
 from mapmerge.result import MergeResult
 from mapmerge.sim2 import Points, Sim2
-from replay.sinks.rerun_entities import MERGED, MERGED_MAP, RobotEntities
+from replay.sinks.rerun_entities import CONTRADICTIONS, MERGED, MERGED_MAP, RobotEntities
 from replay.sinks.rerun_grids import quaternion
 from replay.sinks.rerun_labels import PointM, known_places_m
 from replay.sinks.rerun_lattice import Lattice
 from replay.sinks.rerun_layout import Box as Extent
 from replay.sinks.rerun_layout import Layout, in_view, lay_out
-from replay.sinks.rerun_overlap import Tint
+from replay.sinks.rerun_overlap import RED, Tint
 from replay.sinks.rerun_patches import PatchedMap
 from replay.sinks.rerun_stream import RrdStream
 from replay.sinks.rerun_walls import WallScene
@@ -28,6 +28,8 @@ from replay.sinks.rerun_walls import WallScene
 _MERGED_ORDER = 1.0
 
 _LABEL_Z_M = 1.0
+_MARK_Z_M = 0.3
+_MARK_RADIUS = rr.Radius.ui_points(1.6)
 # In points of the screen, which the library tells from metres by their sign.
 _DOT_RADIUS = rr.Radius.ui_points(0.75)
 
@@ -63,6 +65,7 @@ class MapScene:
         self._stream = stream
         self._robots = robots
         self._merged: Grid | None = None
+        self._is_marked = False
         self._merged_lattice = Lattice()
         self._tint = Tint(cells, tolerance_m)
         self._merged_map = PatchedMap(stream, MERGED_MAP, cells, _MERGED_ORDER, self._tint.paint)
@@ -112,6 +115,19 @@ class MapScene:
         if merged is not None and (merged is not self._merged or not repainted.is_empty):
             self._merged_map.show(self._merged_lattice.take(merged), repainted)
             self._merged = merged
+        if not repainted.is_empty:
+            self._show_contradictions()
+
+    def _show_contradictions(self) -> None:
+        """Mark them above the walls, which have the colours of their robots."""
+        at_m = self._tint.contradictions_m
+        if len(at_m) == 0:
+            if self._is_marked:
+                self._stream.log(CONTRADICTIONS, rr.Clear(recursive=False))
+        else:
+            places = np.column_stack([at_m, np.full(len(at_m), _MARK_Z_M)]).astype(np.float32)
+            self._stream.log(CONTRADICTIONS, rr.Points3D(places, colors=[RED], radii=_MARK_RADIUS))
+        self._is_marked = len(at_m) > 0
 
     def _show_map(self, entities: RobotEntities, grid: Grid) -> None:
         """Log a robot's own map, cropped to what it knows, so that it lies within the merged map once it is placed."""

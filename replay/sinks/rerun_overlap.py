@@ -1,4 +1,4 @@
-"""The merged map in the Rerun recording is green where maps agree and red where they contradict each other.
+"""The merged map in the Rerun recording is green where maps share ground and red where they contradict each other.
 
 The tint is part of the map's picture. As a see-through picture of its own above the map it would vanish at times: the
 viewer draws each of several pictures a little nearer than it lies, and see-through ones where they lie.
@@ -12,17 +12,22 @@ import numpy as np
 
 from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
-from mapmerge.overlap import AGREE, ALONE, CONTRADICT, Overlap, overlap
+from mapmerge.overlap import AGREE, ALONE, CONTRADICT, SHARED, Overlap, overlap
 from mapmerge.plane import NOTHING, Box
 from mapmerge.result import MergeResult
+from mapmerge.sim2 import Points
 from mapmerge.warp import Layer
 from replay.sinks.rerun_grids import Pixels, shades_of
 
 MAX_SIDE_CELLS = 1024
 """Larger maps are compared in larger cells: it is a tint."""
 
-_GREEN, _RED = (40, 190, 95), (255, 40, 40)
-_GREEN_SHARE = 0.21
+_GREEN = (40, 190, 95)
+RED = (255, 40, 40)
+MOST_MARKS = 20_000
+"""So many contradictions at most are marked above the walls."""
+
+_AGREE_SHARE, _SHARED_SHARE = 0.21, 0.1
 
 
 class Tint:
@@ -61,6 +66,16 @@ class Tint:
             )
         return _differs(last, self._found, result.merged)
 
+    @property
+    def contradictions_m(self) -> Points:
+        """Where maps contradict each other: middles of cells in the merged frame, shape (N, 2); of very many, some."""
+        if self._found is None:
+            return np.empty((0, 2))
+        rows_cols = np.argwhere(self._found.kinds == CONTRADICT)
+        rows_cols = rows_cols[:: -(-len(rows_cols) // MOST_MARKS) or 1]
+        middles_m = np.asarray((rows_cols[:, ::-1] + 0.5) * self._found.resolution_m, np.float64)
+        return self._found.merged_from_grid.apply(middles_m)
+
     def paint(self, grid: Grid) -> Pixels:
         """Return a part of the merged map as a picture: in shades or, if some of it is tinted, in colours.
 
@@ -82,8 +97,10 @@ class Tint:
 def _colours() -> Pixels:
     """Return the colour of each kind of cell and shade, shape (kinds, 256, 3)."""
     shades = np.repeat(np.arange(256, dtype=np.float64)[:, None], 3, axis=1)
-    colours = np.stack([shades, shades * (1.0 - _GREEN_SHARE) + np.multiply(_GREEN, _GREEN_SHARE), shades])
-    colours[CONTRADICT] = _RED
+    colours = np.stack([shades] * 4)
+    for kind, share in ((AGREE, _AGREE_SHARE), (SHARED, _SHARED_SHARE)):
+        colours[kind] = shades * (1.0 - share) + np.multiply(_GREEN, share)
+    colours[CONTRADICT] = RED
     return colours.round().astype(np.uint8)
 
 
@@ -104,7 +121,7 @@ def _sampled(found: Overlap, grid: Grid) -> Pixels | None:
     kinds = np.full(grid.cells.shape, ALONE, np.uint8)
     kinds[np.ix_(*inside)] = part
     # maps that agree may still leave a cell at their borders unknown; where they contradict each other, all is shown
-    kinds[(grid.cells < 0) & (kinds == AGREE)] = ALONE
+    kinds[(grid.cells < 0) & (kinds != CONTRADICT)] = ALONE
     return kinds
 
 

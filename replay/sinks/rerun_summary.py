@@ -21,8 +21,8 @@ _EVENTS = {ChangeKind.JUMPED: JUMPED, ChangeKind.WITHDRAWN: WITHDRAWN}
 
 _LEGEND = """\
 - **Walls** are in the colour of the robot that mapped them{ways}.
-- **Green** is where two maps or more agree, **red** where a wall of one stands in free space of another, and **grey** \
-what one map alone knows.
+- **Green** is what two maps or more know, stronger where they agree; **red** where a wall of one stands in free space \
+of another; **grey** what one map alone knows.
 """
 
 

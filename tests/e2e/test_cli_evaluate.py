@@ -90,8 +90,10 @@ def test_truth_may_be_in_another_robots_frame(replay: Program, outcome: Path) ->
     ran = evaluated(replay, outcome, truth, "--max-error-m", "0.1", "--max-error-deg", "0.5")
     assert ran.status == 0, ran.out
     assert ran.out.splitlines()[1].startswith("r2     placed")
-    nothing = {"reference": "r2", "robots": {"r1": as_truth(TRUE, same_place=False)}}
+    nothing = {"reference": "r2", "robots": {"r3": as_truth(TRUE)}}
     assert "it says nothing of how r1" in evaluated(replay, outcome, nothing).error
+    apart = {"reference": "r2", "robots": {"r1": as_truth(TRUE, same_place=False)}}
+    assert "1 false merge" in evaluated(replay, outcome, apart).out
 
 
 def test_what_is_beyond_which_limit_is_said(replay: Program, outcome: Path) -> None:

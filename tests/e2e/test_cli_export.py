@@ -203,7 +203,7 @@ def test_what_is_missing_for_robots_maps_is_said(replay: Program, two: Path, tmp
     assert "as --maps run.mcap, or merge again with --copy-maps" in replay("export", out, "--robots", "r2").error
     assert "r3 is not placed: " in replay("export", out, "--robots", "r3", "--maps", mixed).error
     assert "there are r1, r2, r3" in replay("export", out, "--robots", "r9").error
-    assert "mixed.mcap was merged as well" in replay("export", out, "--robots", "r2", "--maps", two).error
+    assert "mixed.mcap was merged, and is not given" in replay("export", out, "--robots", "r2", "--maps", two).error
     assert "a report holds no map" in replay("export", out.with_suffix(".json")).error
     assert "say whose" in replay("export", out, "--maps", mixed).error
     assert "leave it out" in replay("export", out, "--robots", "r1", "--topic", "/merged/map").error
@@ -338,7 +338,7 @@ def test_maps_of_a_recording_for_each_robot(replay: Program) -> None:
     runs = [ROOT / "samples/bag_per_robot" / name for name in ("alpha", "bravo")]
     out = replay.merge(*runs).mcap
     maps_of = [flag for run in runs for flag in ("--maps", run)]
-    assert "bravo was merged as well" in replay("export", out, "--robots", "alpha", "--maps", runs[0]).error
+    assert "bravo was merged, and is not given" in replay("export", out, "--robots", "alpha", "--maps", runs[0]).error
     ran = replay("export", out, "--robots", "alpha,bravo", *maps_of, "--mode", "raw")
     assert ran.status == 0, ran.err
     merged = maps(out)[-1].grid.cells
@@ -369,7 +369,7 @@ def test_maps_are_taken_of_what_was_merged_alone(replay: Program, tmp_path: Path
         maps_of = [flag for run in runs for flag in ("--maps", run)]
         return replay("export", file, "--robots", robots, *maps_of, "--mode", "raw", "--force", *flags)
 
-    assert "run.mcap was merged as well" in exported(f"r2={other}").error
+    assert "run.mcap was merged, and is not given" in exported(f"r2={other}").error
     assert "is not the recording that was merged: it has " in exported(f"r1={one}", f"r2={third}").error
     assert "is not the recording that was merged" in exported(f"r2={one}", f"r1={other}").error
     assert "r3" in exported(f"r1={one}", f"r3={other}").error

@@ -159,7 +159,9 @@ def test_names_are_those_of_a_shell_where_a_command_is_told(
         monkeypatch.delenv(name, raising=False)
     shutil.copy(rrd, tmp_path / "a run; ls.rrd")
     said = replay("view", "a run; ls.rrd").error
-    assert shlex.split(said.partition("in a browser: ")[2])[:3] == ["rerun", "a run; ls.rrd", "--web-viewer"]
+    command, *arguments = shlex.split(said.partition("in a browser: ")[2])
+    assert Path(command).name == "rerun"
+    assert arguments[:2] == ["a run; ls.rrd", "--web-viewer"]
 
 
 @POSIX

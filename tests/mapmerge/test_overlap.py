@@ -5,7 +5,7 @@ import pytest
 
 from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
-from mapmerge.overlap import AGREE, ALONE, CONTRADICT, overlap
+from mapmerge.overlap import AGREE, CONTRADICT, SHARED, overlap
 from mapmerge.sim2 import IDENTITY, Sim2
 from mapmerge.warp import Layer
 from tests.floors import filled
@@ -46,7 +46,11 @@ def test_ground_of_one_map_alone_says_nothing():
     found = compared(Layer(room(70), IDENTITY), Layer(Grid(part, CELL_M), IDENTITY))
     assert found.kinds.shape == (60, 40)
     assert set(np.unique(found.kinds)) == {AGREE}
-    assert compared(Layer(room(70), IDENTITY), Layer(filled(50, 60, 80), IDENTITY)).kinds.max() == ALONE
+
+
+def test_ground_that_one_of_two_maps_is_not_sure_of_is_shared():
+    found = compared(Layer(room(70), IDENTITY), Layer(filled(50, 60, 80), IDENTITY))
+    assert set(np.unique(found.kinds)) == {SHARED}
 
 
 @pytest.mark.parametrize("layers", [[room(30)], [room(30), filled(-1, 60, 80)], [room(30), filled(0, 0, 0)]])

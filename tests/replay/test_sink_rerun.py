@@ -130,6 +130,23 @@ class Entity:
         return [(row.get(component) or [None])[0] for row in self.rows]
 
 
+def misplaced(story: list[Event]) -> list[Event]:
+    """Return the same run, but that r2 was placed a metre beside its place when it was placed first."""
+    events = list(story)
+    first = next(
+        index
+        for index, event in enumerate(events)
+        if isinstance(event, Merged) and event.result.robots["r2"].status is Status.MERGED
+    )
+    event = events[first]
+    assert isinstance(event, Merged)
+    outcome = event.result.robots["r2"]
+    assert outcome.merged_from_map is not None
+    robots = {**event.result.robots, "r2": replace(outcome, merged_from_map=Sim2(1.0, 1.0) @ outcome.merged_from_map)}
+    events[first] = replace(event, result=replace(event.result, robots=robots))
+    return events
+
+
 GREY, COLOURS = (int(getattr(rr.ColorModel, name).value) for name in ("L", "RGB"))
 
 
@@ -161,7 +178,7 @@ def test_the_entities_are_those_of_the_documented_tree(recording: Path) -> None:
     assert not any("r4" in path for path in found if not path.startswith(("/plots", "/status")))
 
 
-def test_every_entity_is_documented(recording: Path, tmp_path: Path) -> None:
+def test_every_entity_is_documented(recording: Path, story: list[Event], tmp_path: Path) -> None:
     text = (ROOT / "docs" / "output-formats.md").read_text(encoding="utf-8")
     rows = [line for line in text[text.index("## Rerun recording") :].splitlines() if line.startswith("| `/")]
     named = [name for row in rows for name in re.findall(r"`(/[^`]+)`", row.split("|")[1])]
@@ -172,7 +189,8 @@ def test_every_entity_is_documented(recording: Path, tmp_path: Path) -> None:
     changed[3, 4] = 100
     ticks = {STAMPS[0]: {"r1": filled(0, side, side)}, STAMPS[1]: {"r1": Grid(changed, 0.05)}}
     large = written(tmp_path / "large.rrd", events_of(["r1"], ticks))
-    found = {chunk.entity_path for path in (recording, driven, large) for chunk in RrdReader(path).stream()}
+    wrong = written(tmp_path / "wrong.rrd", misplaced(story))
+    found = {chunk.entity_path for path in (recording, driven, large, wrong) for chunk in RrdReader(path).stream()}
     assert {path for path in found if not any(pattern.fullmatch(path) for pattern in patterns.values())} == set()
     unused = {name for name, pattern in patterns.items() if not any(map(pattern.fullmatch, found))}
     assert unused == {"/plots/acceptance/limit"}, "the method that is used states a confidence"
@@ -219,6 +237,14 @@ def test_the_merged_map_is_tinted_while_maps_are_placed(recording: Path, story: 
     green = pixels[..., 1] > pixels[..., 0]
     last = next(event for event in reversed(story) if isinstance(event, Merged))
     assert green.sum() * cell_m**2 == pytest.approx(last.result.robots["r2"].agreement.overlap_m2, rel=0.2)
+
+
+def test_contradictions_are_marked_above_the_walls_until_they_are_gone(story: list[Event], tmp_path: Path) -> None:
+    entity = Entity(written(tmp_path / "wrong.rrd", misplaced(story)), "/merged/contradictions")
+    places, *_, cleared = entity.rows
+    assert len(places["Points3D:positions"]) > 20
+    assert all(z > 0.1 for _, _, z in places["Points3D:positions"])
+    assert cleared.get("Clear:is_recursive") == [False]
 
 
 def test_ways_grow_piece_by_piece_and_are_parted_where_robots_jump(story: list[Event], tmp_path: Path) -> None:
