@@ -37,6 +37,7 @@ _EXPECTED = "a ROS 1 bag, an MCAP file, a ROS 2 bag folder, a .db3 file or the .
 _OTHERS = (
     ((b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"PK\x03\x04", b"\x04\x22\x4d\x18"), "it is an archive: unpack it first"),
     ((b"P5", b"P2", b"\x89PNG", b"BM"), "it is an image: give the .yaml that describes it as a map"),
+    ((b"RRF",), "it is Rerun's: give the recording that it was made of, or the .mcap beside it"),
 )
 
 

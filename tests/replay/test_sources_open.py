@@ -95,6 +95,7 @@ def test_file_that_is_no_recording(tmp_path: Path) -> None:
         (zstandard.compress(b"x"), "zstd -d"),
         (zstandard.compress(zstandard.compress(b"x")), "zstd -d"),
         (b"\x28\xb5\x2f\xfd....", "copy it again"),
+        (b"RRF2\0\0", "the .mcap beside it"),
         (zstandard.compress(bytes(1000))[:8], "ends early at byte 8"),
         (b"P5\n2 2\n255\n....", ".yaml"),
     ],
