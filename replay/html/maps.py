@@ -75,7 +75,7 @@ def merged_stack(story: Story) -> Stack | None:
     if len(maps) > 1:
         found = compared_on([layer for _, layer in placed], pixels, story.cells, story.tolerance_m)
         tint = tint_picture(found, np.logical_or.reduce([shown.walls for shown in maps]), pixels)
-        layers.append(MapLayer("where maps overlap", tint, None, shown=False, kind="tint"))
+        layers.append(MapLayer("where maps overlap", tint, None, shown=True, kind="tint"))
     driven = ways(story, [(member, layer.merged_from_map) for member, layer in placed], pixels)
     return Stack(tuple(layers), driven, result.merged.resolution_m)
 
