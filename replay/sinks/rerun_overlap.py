@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mapmerge.config import CellConfig
 from mapmerge.grid import Grid
@@ -17,6 +18,7 @@ from mapmerge.plane import NOTHING, Box
 from mapmerge.result import MergeResult
 from mapmerge.sim2 import Points
 from mapmerge.warp import Layer
+from replay.sinks.rerun_entities import GROUND
 from replay.sinks.rerun_grids import Pixels, shades_of
 
 MAX_SIDE_CELLS = 1024
@@ -91,17 +93,25 @@ class Tint:
         """
         shades = shades_of(grid)
         kinds = None if self._found is None else _sampled(self._found, grid)
-        return shades if kinds is None else _COLOURS[kinds, shades]
+        if kinds is None:
+            return shades
+        # four bytes as one number are looked up several times as fast
+        coloured = _COLOURS.take((kinds.astype(np.uint16) << 8) | shades)
+        return coloured.view(np.uint8).reshape(*shades.shape, 4)[..., :3]
 
 
-def _colours() -> Pixels:
-    """Return the colour of each kind of cell and shade, shape (kinds, 256, 3)."""
+def _colours() -> NDArray[np.uint32]:
+    """Return the colour of each kind of cell and shade, shape (kinds × 256,), each as four bytes in one number."""
     shades = np.repeat(np.arange(256, dtype=np.float64)[:, None], 3, axis=1)
     colours = np.stack([shades] * 4)
     for kind, share in ((AGREE, _AGREE_SHARE), (SHARED, _SHARED_SHARE)):
         colours[kind] = shades * (1.0 - share) + np.multiply(_GREEN, share)
+    # maps that agree may still leave a cell at their borders unknown; where they contradict each other, all is shown
+    colours[:, GROUND[0]] = GROUND
     colours[CONTRADICT] = RED
-    return colours.round().astype(np.uint8)
+    bytes_of = np.full((*colours.shape[:2], 4), 255, np.uint8)
+    bytes_of[..., :3] = colours.round()
+    return bytes_of.view(np.uint32).ravel()
 
 
 _COLOURS = _colours()
@@ -115,13 +125,13 @@ def _sampled(found: Overlap, grid: Grid) -> Pixels | None:
         for start_m, number in ((corner.y_m, grid.rows), (corner.x_m, grid.cols))
     )
     inside = [(at >= 0) & (at < most) for at, most in zip((rows, columns), found.kinds.shape, strict=True)]
-    part = found.kinds[np.ix_(rows[inside[0]], columns[inside[1]])]
+    part = found.kinds.take(rows[inside[0]], axis=0).take(columns[inside[1]], axis=1)
     if not part.any():
         return None
     kinds = np.full(grid.cells.shape, ALONE, np.uint8)
-    kinds[np.ix_(*inside)] = part
-    # maps that agree may still leave a cell at their borders unknown; where they contradict each other, all is shown
-    kinds[(grid.cells < 0) & (kinds != CONTRADICT)] = ALONE
+    # what is inside follows each other, along both axes
+    (top, *_), (left, *_) = (np.flatnonzero(each) for each in inside)
+    kinds[top : top + part.shape[0], left : left + part.shape[1]] = part
     return kinds
 
 
