@@ -29,16 +29,12 @@ def linked_otherwise(report: Report) -> str | None:
     with it: that is no decision, but the reasons of the end name other robots than those of the log.
     """
     said = {
-        item["robot"]: str(item["reason"]["message"])
+        item["robot"]: item["placed_via"]
         for item in report["history"]
         if item["event"] in (ChangeKind.PLACED, ChangeKind.MOVED)
     }
     via = {robot: values["placed_via"] for robot, values in report["robots"].items() if values["status"] == "merged"}
-    others = [
-        f"{brief(robot)} on {brief(other)}"
-        for robot, other in via.items()
-        if robot in said and not said[robot].startswith(f"placed on {other}: ")
-    ]
+    others = [f"{brief(robot)} on {brief(other)}" for robot, other in via.items() if said.get(robot, other) != other]
     if not others:
         return None
     return f"placed by other matches in the end than when that was decided, at the same places: {listed(others)}"

@@ -92,6 +92,7 @@ class ReportBuilder:
         self._told = len(self._history)
         self._updates.update(result.updated)
         for change in result.changes:
+            outcome = result.robots[change.robot]
             if change.kind is ChangeKind.PLACED:
                 self._first_merged_ns.setdefault(change.robot, stamp_ns)
             self._history.append(
@@ -101,7 +102,8 @@ class ReportBuilder:
                     "event": str(change.kind),
                     "reason": _reason(change.reason),
                     "trigger": None if change.trigger is None else str(change.trigger),
-                    "merged_from_map": _pose(result.robots[change.robot].merged_from_map),
+                    "placed_via": outcome.placement.via if outcome.placement else None,
+                    "merged_from_map": _pose(outcome.merged_from_map),
                 }
             )
         for pair, trigger in result.searched.items():
